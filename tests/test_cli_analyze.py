@@ -133,7 +133,7 @@ def test_effects_of_a_machine_file_are_honoured_and_instruments_set_aside(part, 
         + "".join(f"{key} = 1.0\n" for key in _keys("thermal_drift"))
     )
     assert main(["analyze", "part.nc", "--machine", "gauge.toml", "--no-plots"]) == 0
-    assert "instruments set aside" in capsys.readouterr().out
+    assert "instrument effects ignored" in capsys.readouterr().out
     values = []
     for machine in ("nist", "bars.toml"):
         assert main(["analyze", "part.nc", "--machine", machine, "--json", "--no-plots"]) == 0
@@ -158,14 +158,14 @@ def test_effects_of_a_machine_file_are_honoured_and_instruments_set_aside(part, 
         (["analyze", "part.nc", "--force", "-5"], "more than 0"),
         (["analyze", "part.nc", "--require", "-1"], "more than 0"),
         (["analyze", "part.nc", "--format", "xml"], "expected one of csv, parquet"),
-        (["analyze", "part.nc", "--effects", "none.py"], "does not exist"),
+        (["analyze", "part.nc", "--effects", "none.py"], "no effects file"),
         (["analyze"], "required"),
         (["analyse", "part.nc"], "Did you mean `tps analyze`"),
         (["--anlyze"], "tps does not know '--anlyze'"),
         (["check", ""], "program ''"),
         (["compare", "long" * 99], "File name too long"),
         (["machine", "check", "."], "Is a directory"),
-        (["effects", "check", "."], "is not a file"),
+        (["effects", "check", "."], "no effects file"),
         (["case-study", "--region", "left"], "NAME:X,Y,Z"),
         (["place", "part.nc", "--keep-out", "clamp"], "NAME:X0,Y0,Z0,X1,Y1,Z1"),
         (["plan", "--cost", "pose"], "WHAT=MINUTES"),

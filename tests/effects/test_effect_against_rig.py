@@ -54,11 +54,11 @@ def campaign(tmp_path_factory):
     """The rig's tilted layout: its own rows, and the same read back from a measurement file."""
     nominal = load_nominal("nist")
     table = tilted_campaign(nominal, np.random.default_rng(5))
-    columns = {name: values for name, values in table.items() if name != "stiffness_N_per_mm"}
+    columns = {**table, "stiffness_N_per_mm": ["50000"] * len(table["direction"])}
     lines = [",".join(columns)] + [",".join(str(cell) for cell in row) for row in zip(*columns.values(), strict=True)]
-    file = tmp_path_factory.mktemp("rig") / "plan.csv"
+    file = tmp_path_factory.mktemp("rig") / "campaign.csv"
     file.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    return nominal, rows_of(table), read_measurements(file, nist(), planned=True)
+    return nominal, rows_of(table), read_measurements(file, nist())
 
 
 def ours(name: str) -> StiffnessModel:

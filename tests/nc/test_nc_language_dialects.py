@@ -182,7 +182,7 @@ def test_a_controller_file(tmp_path):
     assert read_program(program, controller=read_controller(path, "linuxcnc")).dialect.startswith("linuxcnc, changed")
     with pytest.raises(InputError, match="without --write"):
         rewrite_program(read, (0.0,) * 6, (0.0,) * 6)
-    with pytest.raises(InputError, match="its own dialect alone"):
+    with pytest.raises(InputError, match="its own dialect only"):
         read_program(program, controller=read_controller(path), interpreter="linuxcnc")
 
 
@@ -253,6 +253,7 @@ def test_the_options_of_the_command_line(tmp_path, capsys):
     [
         ("G0 X1\n" * 60 + "5 L X+10 Y+5 R0 FMAX\n", "Heidenhain", 61),
         ("G21\nN10 #SLOPE[TYPE=STEP]\n", "ISG", 2),
+        ("%PLATE G71 *\nN10 G01 X+10 F200 *\n", "DIN/ISO", 1),
         ("SLOPE[TYPE=HSC]\n", "ISG", 1),
         (': (PGM, NAME="1001")\n: G90 G40 G94\n', "Acramatic", 1),
         ("sub _tool_change[#tool] {\nG90\n}\n", "neither LinuxCNC's", 1),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from tests.stiffness.cases import nist
 from toolpath_stiff.inference.candidates import Candidate, Component
 from toolpath_stiff.inference.least_squares import scaled_inverse
 from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.machine.model import MachineTool
 from toolpath_stiff.planning.forecasts import Rival
 from toolpath_stiff.readings.measurements import Readings, read_measurements
 from toolpath_stiff.stiffness.active import ActiveEffect
@@ -86,3 +88,13 @@ def rivals(truth: str, other: str) -> tuple[Rival, Rival]:
     predictor = Predictor(nist(), table_1_design())
     observed = predictor.log_stiffness((0.0, 0.0), (active(truth, SIZES[truth]),))
     return rival(truth, observed), rival(other, observed)
+
+
+def read_filled(file: Path, machine: MachineTool) -> Readings:
+    """A plan as it is read once it is filled in: 50,000 N/mm in every row."""
+    head, *rows = file.read_text("utf-8").splitlines()
+    column = head.split(",").index("stiffness_N_per_mm")
+    cells = [row.split(",") for row in rows]
+    filled = [",".join([*row[:column], "50000", *row[column + 1 :]]) for row in cells]
+    file.with_name("filled.csv").write_text("\n".join([head, *filled]), "utf-8")
+    return read_measurements(file.with_name("filled.csv"), machine)

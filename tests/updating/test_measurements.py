@@ -115,11 +115,9 @@ def test_what_these_data_cannot_test(write):
     }
 
 
-def test_a_plan_leaves_the_stiffness_empty(write):
-    file = write(SHORT + "0,0,800,X,\n")
-    assert np.isnan(read_measurements(file, nist(), planned=True).stiffness).all()
+def test_a_plan_is_filled_in_before_it_is_read(write):
     with pytest.raises(InputErrors, match="no stiffness"):
-        read_measurements(file, nist())
+        read_measurements(write(SHORT + "0,0,800,X,\n"), nist())
 
 
 def test_a_pose_beyond_an_assumed_limit_is_a_warning(write):

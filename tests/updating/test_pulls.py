@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import toolpath_stiff as tps
+from tests.updating.planning import read_filled
 from toolpath_stiff.cli.main import main
 from toolpath_stiff.machine.elements import Stance
-from toolpath_stiff.readings.measurements import model_stiffness, read_measurements
+from toolpath_stiff.readings.measurements import model_stiffness
 from toolpath_stiff.stiffness.element_sum import tip_compliance
 from toolpath_stiff.stiffness.model import StiffnessModel, build_model, parameter_slopes, path_of_stance
 
@@ -225,7 +226,7 @@ def test_a_plan_tells_elements_apart_on_every_kind(kind: str, tmp_path: Path) ->
     softer.write_text(f'{machine.stated.text}\n[[effect]]\nname = "{effect}"\nelement = "{first}"\n{entry}\n', "utf-8")
     plan.save(tmp_path / "plan", plots=False)
     head, *rows = (tmp_path / "plan" / "plan.csv").read_text("utf-8").splitlines()
-    planned = read_measurements(str(tmp_path / "plan" / "plan.csv"), machine.stated, planned=True)
+    planned = read_filled(tmp_path / "plan" / "plan.csv", machine.stated)
     read = model_stiffness(tps.Machine.load(softer).model, planned) / 1e3
     column = head.split(",").index("stiffness_N_per_mm")
     cells = [row.split(",") for row in rows]
@@ -349,16 +350,18 @@ def test_components_in_the_tip_axes(tmp_path: Path) -> None:
 
 
 def test_a_pull_far_off_is_named_and_not_counted(tmp_path: Path) -> None:
-    """A slip of a decimal point among pulls that no single effect explains; and rows of no load are passed over."""
+    """A slip of a decimal point among pulls that no effect explains; rows of no load, joints beyond their limits."""
     off = tmp_path / "off.toml"
     off.write_text(ROBOT.read_text("utf-8").replace("[620.0, 340.0, 460.0,", "[900.0, 500.0, 300.0,"), "utf-8")
     head, rows = rows_of(campaign(tmp_path / "a.csv", 9, "bending", 2, 30))
     rows[4, 9:12] *= 10.0
+    rows[7, 0] += 360.0  # the same place, which the joint cannot reach so
     none = np.zeros((1, rows.shape[1]))
     none[0, :6], none[0, 12] = rows[0, :6], SD_UM
     found = tps.diagnose(written(tmp_path / "w.csv", head, np.vstack([rows, none])), off)
     assert found.verdict == "unexplained" and f"{tmp_path / 'w.csv'}:6 x" in found.wild and len(found.wild) == 3
-    assert found.error_as_given < 40.0 and "1 rows of no force, or of which nothing" in str(found)
+    assert found.error_as_given < 40.0 and "1 rows of no force, or without a reading" in str(found)
+    assert "w.csv:9: joints beyond their limits in the machine file (rows: 1)" in str(found)
 
 
 def test_tables_of_pulls_are_refused_where_stiffnesses_are_read(tmp_path: Path) -> None:

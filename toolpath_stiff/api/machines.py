@@ -18,7 +18,7 @@ from toolpath_stiff.machine.elements import Stance
 from toolpath_stiff.machine.file import load_machine, packaged_machines
 from toolpath_stiff.machine.kinematics import Struts
 from toolpath_stiff.machine.limits import Reach, reach_along, stand
-from toolpath_stiff.machine.model import Hexapod, MachineTool, as_hexapod
+from toolpath_stiff.machine.model import Hexapod, MachineTool
 from toolpath_stiff.machine.writer import machine_toml
 from toolpath_stiff.nc.program import Program
 from toolpath_stiff.options import Option, checked
@@ -46,7 +46,7 @@ class Machine(Result):
     asked
         The name or file that it was loaded by.
     effect_files
-        Python files with effects of one's own.
+        Python files with your own effects.
     setup, temperature_C
         As `load` was told; None: as the controller file or the machine file says.
     allow_unchecked_effects
@@ -58,8 +58,6 @@ class Machine(Result):
     >>> machine = tps.Machine.load("nist")
     >>> machine
     <Machine nist: 6 struts, no effects>
-    >>> machine.strut_lengths_mm((0, 0, 800)).round(1).tolist()
-    [2884.7, 2869.9, 2884.7, 2869.9, 2884.7, 2869.9]
     >>> machine.name, machine.effects, machine.inputs
     ('nist', [], ('nist',))
     >>> machine.origin_mm_deg
@@ -96,13 +94,13 @@ class Machine(Result):
         machine
             Name or file.
         effects
-            File with physical effects of one's own, which the machine file may name.
+            File with your own physical effects, which the machine file may use.
         setup
-            The set-up that is on the machine, for effects that belong to one; "none": none that has a name.
+            The set-up on the machine, for effects that belong to a set-up; "none": one without a name.
         temperature_C
             Degrees Celsius, for effects that need it.
         allow_unchecked_effects
-            Compute even with effects of one's own that fail `tps effects check`; every result says so.
+            Use your own effects even if they fail `tps effects check`; every result says so.
 
         Raises
         ------
@@ -135,8 +133,8 @@ class Machine(Result):
         Parameters
         ----------
         setup
-            Set-up that is on the machine, for effects that belong to one; none: a set-up without a name. Unless given,
-            the controller file's, else the machine file's.
+            Set-up on the machine, for effects that belong to a set-up; none: one without a name. Unless given, that of
+            the controller file, otherwise of the machine file.
         temperature_C
             Degrees Celsius, for effects that need it; unless given, the machine file's.
 
@@ -242,29 +240,17 @@ class Machine(Result):
         """Files from which the machine was read."""
         return (self.asked, *self.effect_files)
 
-    def strut_lengths_mm(self, pose_mm_deg: Sequence[float]) -> FloatArray:
-        """(6,) lengths of the struts between their joint centres at a pose (inverse kinematics).
+    def joint_values(self, pose_mm_deg: Sequence[float]) -> dict[str, float]:
+        """Values of the joints at a pose, mm or degrees, by their columns in results; nan where none lead there.
 
         `pose_mm_deg` is X, Y, Z or X, Y, Z, A, B, C of the tool tip; the reference tool is in the spindle.
 
         Examples
         --------
         >>> import toolpath_stiff as tps
-        >>> machine = tps.Machine.load("nist")
-        >>> machine.strut_lengths_mm((100, 0, 800, 0, 10, 0)).round(1).tolist()
-        [2874.1, 2822.0, 2976.3, 2940.1, 2827.7, 2873.1]
-        """
-        as_hexapod(self.model.machine, "a question for strut lengths")
-        return mm_from_m(self.standing(pose_mm_deg)[1].joints[0])
-
-    def joint_values(self, pose_mm_deg: Sequence[float]) -> dict[str, float]:
-        """Values of the joints at a pose, mm or degrees, by their columns in results; nan where none lead there.
-
-        Examples
-        --------
-        >>> import toolpath_stiff as tps
-        >>> list(tps.Machine.load("nist").joint_values((0, 0, 800)))[:2]
-        ['strut1_mm', 'strut2_mm']
+        >>> lengths = tps.Machine.load("nist").joint_values((100, 0, 800, 0, 10, 0))
+        >>> {name: round(length, 1) for name, length in lengths.items()}["strut1_mm"]
+        2874.1
         """
         columns = joint_columns(self.model.machine, self.standing(pose_mm_deg)[1].joints)
         return {name: float(values[0]) for name, values in columns.items()}

@@ -26,7 +26,7 @@ def reduce(
       x_mm,y_mm,z_mm,direction     where and along what (X, Y, Z; or dx,dy,dz), optionally a_deg,b_deg,c_deg
       jog_um                       how far the machine was told to move from zero
       force_N,displacement_um      gauge and indicator, positive the way the jog counts
-      date                         2024-03-31, 2024-03-31T14:05, 2024-03, 2024; each date is a loop of its own
+      date                         2024-03-31, 2024-03-31T14:05; each date is a loop of its own
       point,setup,clamp,repeat,loop,tool_extension_mm,time_min,temperature_C   optional, carried along
     of a strut alone on a bench:   strut (1 to 6), date, force_N, displacement_um; length_mm if known; no pose,
                                    no jog; or strut, date, stiffness_N_per_mm of struts that were reduced elsewhere
@@ -42,16 +42,14 @@ def reduce(
     Parameters
     ----------
     raw
-        Raw records: files, FILE.xlsx[#SHEET], folders of files.
+        Raw records: files, FILE.xlsx[#SHEET].
     compression_positive
-        Forces of struts on a bench count compression positive.
+        Forces of struts on a bench are positive in compression.
     out
         File to write (default: <first RAW>_measurements.csv); loops go beside it.
     """
     reduction = tps.reduce(*raw, columns=args.columns, compression_positive=compression_positive)
-    first = Path(split_name(raw[0])[0])
-    name = first.stem if first.is_file() else first.resolve().name
-    target = Path(out or f"{name or 'raw'}_measurements.csv")
+    target = Path(out or f"{Path(split_name(raw[0])[0]).stem}_measurements.csv")
     written = [str(file) for file in run.write_single(args, reduction.files(target, plots=not args.no_plots))]
     run.tell("read", reduction.read_as)
     run.tell("note", reduction.notes)

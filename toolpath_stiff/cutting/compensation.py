@@ -7,7 +7,6 @@ that of the cut less the shift; what varies over the height no shift removes.
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -33,12 +32,11 @@ if TYPE_CHECKING:
 LARGEST = 1e-4  # m, and half of the width of cut: a line that would be shifted by more is left alone
 SETTLED = 5e-8  # m, half of the last decimal written: a change of the shift that is worth another turn
 MOST_TURNS, SWINGING = 6, 0.9
-CONTRACTION = 0.3  # ratio of a turn's change to that of the turn before; above it a warning
 SHORT = 3e-3  # m of a move, below which it is a part of a wall
 SAME = 1e-7  # m by which the error of a wall may grow: rounding of the numbers written, and of the stock's grid
 WORSE = "it would be worse"
-ELSEWHERE = "lines beside it make its wall afterwards"
-BETWEEN = "it lies between two walls: what a shift takes off one it adds to the other"
+ELSEWHERE = "other lines cut its wall afterwards"
+BETWEEN = "it lies between two walls: what a shift removes from one it adds to the other"
 
 
 @dataclass(frozen=True)
@@ -186,8 +184,6 @@ class Compensation(Result):
         (n,) m to the left of the feed at each sample of `before`.
     turns
         Of the iteration, the programs that were written and cut.
-    contraction
-        Largest ratio of the change of a turn to that of the turn before; nan where the first turn settled it.
     course_error_um
         How far courses are from their shift where that varies along a move.
     notes
@@ -203,7 +199,6 @@ class Compensation(Result):
     after: Cut
     shift: FloatArray
     turns: int
-    contraction: float
     course_error_um: float
     notes: tuple[str, ...]
 
@@ -236,7 +231,7 @@ class Compensation(Result):
 
     def to_dict(self) -> dict[str, Any]:
         """The JSON document of the command."""
-        names = ("turns", "contraction", "course_error_um", "notes")
+        names = ("turns", "course_error_um", "notes")
         document = {"program": self.rewritten.name, "changed": self.changed, "walls": self.walls}
         document["lines"] = records(self.lines)
         return dict(certain(without_nan(to_dict(document | {name: getattr(self, name) for name in names}))))
@@ -285,7 +280,7 @@ def compensate_program(
     if not len(before.row):
         raise ProgramError("no pass makes a wall of the finished part", file=program.name)
     still = np.unique(before.row[~movable_rows(moves)[before.row]]).tolist()
-    alone = dict.fromkeys(still, "a plunge, an arc on edge, or a tool aslant")
+    alone = dict.fromkeys(still, "a plunge, a vertical arc, or a tilted tool")
     alone |= _too_far(before)
     fixed = shift_program(program, origin, {}, decimals=decimals, control=control)[2]
     alone |= {
@@ -319,11 +314,9 @@ def compensate_program(
     shift = np.zeros(len(before_cut.samples))
     shift[np.isfinite(before_cut.wall_mean).any(axis=1)] = _intended(shifts, before)
     was, now = figures_of_walls(before, len(moves)), figures_of_walls(after, len(moves))
-    ratios = [later / sooner for sooner, later in itertools.pairwise(changes) if later > SETTLED]
-    contraction = max(ratios, default=float("nan"))
     return Compensation(
-        rewritten, _lines(moves, was, now, alone), before_cut, cut, shift, turn, contraction,
-        um_from_m(m_from_mm(side.error)), _notes(changes[-1], contraction, before_cut, rewritten),
+        rewritten, _lines(moves, was, now, alone), before_cut, cut, shift, turn,
+        um_from_m(m_from_mm(side.error)), _notes(changes[-1], before_cut, rewritten),
     )  # fmt: skip
 
 
@@ -381,13 +374,8 @@ def _lines(
     return columns
 
 
-def _notes(change: float, contraction: float, cut: Cut, rewritten: RewrittenProgram) -> tuple[str, ...]:
-    notes = [*rewritten.notes, *cut.lines_warning(cut.turning, "left alone: the tool turns on its way")]
-    if contraction > CONTRACTION:
-        notes.append(
-            f"the force depends on the shift: a turn of the iteration leaves {contraction:.2f} of the change before "
-            f"it, more than {CONTRACTION:g}; a wider cut or a stiffer tool would be surer"
-        )
+def _notes(change: float, cut: Cut, rewritten: RewrittenProgram) -> tuple[str, ...]:
+    notes = [*rewritten.notes, *cut.lines_warning(cut.turning, "not shifted: the tool turns along the move")]
     if change > SETTLED:
-        notes.append(f"the iteration did not settle: the last turn still changed shifts by {um_from_m(change):.2f} um")
+        notes.append(f"the iteration did not converge: its last step changed shifts by {um_from_m(change):.2f} um")
     return (*notes, "floors are not compensated")

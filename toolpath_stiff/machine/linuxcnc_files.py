@@ -60,6 +60,14 @@ class ControlFiles:
         """Mm of a length."""
         return UNITS_MM[self.units]
 
+    @property
+    def travel(self) -> tuple[float | None, float | None]:
+        """Shortest and longest strut, mm, that all joints reach; None where they have no limits."""
+        if not self.limits:
+            return None, None
+        low, high = np.array(list(self.limits.values())).T * self.scale
+        return float(low.max()), float(high.min())
+
     def pin(self, name: str, default: float | None = None) -> float:
         """The value of a pin. Raises `InputError` where it must be set and is not."""
         if name not in self.pins and default is None:

@@ -96,7 +96,7 @@ def _genhex(files: ControlFiles) -> tuple[str, list[str]]:
     for part, name in (("base", "frame_joints"), ("platform", "platform_joints")):
         joints = np.array([[files.length(f"{part}.{i}.{axis}") for axis in "xyz"] for i in range(6)])
         parts.append(section(f"[{name}]", {"mm": joints + np.array([0.0, 0.0, raised]), "origin": "published"}))
-    low, high = _travel(files)
+    low, high = files.travel
     blanks: dict[str, Document] = {
         "reference_tool": {"length_mm": None},
         "strut_law": {"stiffness_N_per_um": None},
@@ -111,21 +111,13 @@ def _genhex(files: ControlFiles) -> tuple[str, list[str]]:
     return "hexapod", [note + parts[0], *parts[1:]]
 
 
-def _travel(files: ControlFiles) -> tuple[float | None, float | None]:
-    """Shortest and longest strut, mm; None where the files do not limit them."""
-    if not files.limits:
-        return None, None
-    low, high = np.array(list(files.limits.values())).T * files.scale
-    return float(low.max()), float(high.min())
-
-
 def _penta(files: ControlFiles) -> tuple[str, list[str]]:
     top: Document = {
         "base_mm": np.array([[files.length(f"base.{i}.{axis}") for axis in "xyz"] for i in range(5)]),
         "ring_radius_mm": [files.length(f"effector.{i}.r") for i in range(5)],
         "ring_height_mm": [files.length(f"effector.{i}.z") for i in range(5)],
     }
-    low, high = _travel(files)
+    low, high = files.travel
     blank = dict.fromkeys(("length_mm", "compliance_nm_per_N", "slope_nm_per_N_per_m"))
     strut: Document = {**blank, "min_mm": low, "max_mm": high}
     torsion = dict.fromkeys(("strut", "EI_MNm2", "hinge_nrad_per_Nm"))

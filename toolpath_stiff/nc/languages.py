@@ -27,11 +27,13 @@ STATEMENT = re.compile(
 G_CODE, CUTTER_LOCATION_FILE = "G code", "cutter-location file (APT)"
 _HEIDENHAIN = LANGUAGES["heidenhain"]
 _SIEMENS = LANGUAGES["siemens"]
+_DIN_ISO = "the DIN/ISO language of Heidenhain's controls"
 _ISG = "ISG's own language (Beckhoff TwinCAT CNC)"
 _ACRAMATIC = "the language of Acramatic controls (Cincinnati, Vickers)"
 _SUB = "neither LinuxCNC's language (o<name> sub) nor Fanuc's"
 HINTS = {
     _HEIDENHAIN: "post it as ISO G code, in X, Y, Z, A, B, C of the tool tip",
+    _DIN_ISO: "post it as conversational language (.h), or as ISO G code of another control",
     _SIEMENS: "one language throughout, or the program alone",
     _ISG: "post it as ISO G code: no # commands, no $IF, no V. variables",
     _ACRAMATIC: "post it as ISO G code of Fanuc's or LinuxCNC's kind",
@@ -45,6 +47,7 @@ _SIGNS = (
     (_HEIDENHAIN, r"(?:L|LN|C|CC|CR|CT|RND|CHF)\s[^(;]*\bF\s*MAX\b|C\s+I?[A-Z][+-][^(;]*\bDR[+-]"),
     (_HEIDENHAIN, r"(?:L|CC|LN)\s+I?[XYZABC][+-]"),
     (_HEIDENHAIN, r"TOOL\s+(?:CALL|DEF)\b|CYCL\s+(?:DEF|CALL)\b|BLK\s+FORM\b|CALL\s+LBL\b|LBL\s+\d|PLANE\s+[A-Z]+"),
+    (_DIN_ISO, r"%\S+\s+G7[01]\b"),
     (_SIEMENS, r";\s*\$PATH\s*=|%_N_\w+_(?:MPF|SPF)\b"),
     (_SIEMENS, r"DEF\s+(?:REAL|INT|BOOL|STRING|CHAR|AXIS|FRAME)\b|PROC\s+\w+|EXTERN\s+\w+"),
     (_SIEMENS, r"MSG\s*\(|(?:CYCLE|POCKET|SLOT|HOLES)\d+\s*\(|WORKPIECE\s*\("),

@@ -10,7 +10,10 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+from toolpath_stiff.nc.geometry import refuse_arc_if
+
 LEAST_MM = 1e-9  # a side or a step of less is none
+MOST_LAYERS = 10_000  # or rings in a layer
 Leg = tuple[complex, complex | None]  # end, and the centre of an arc
 Cut = tuple[complex, float, float | None, complex | None, int]  # place, height, feed (None: rapid), centre, turn
 Heights = tuple[list[float], float, float]  # of the layers, safe above all, ahead of a cut
@@ -73,6 +76,7 @@ def layers(top: float, bottom: float, most: float) -> list[float]:
     [-2.0, -5.0]
     """
     count = max(1, math.ceil((top - bottom) / most - LEAST_MM)) if most > 0.0 else 1
+    refuse_arc_if(count > MOST_LAYERS, "infeeds in too many steps", "larger ones")
     return [top + (bottom - top) * index / count for index in range(1, count + 1)]
 
 
@@ -82,6 +86,7 @@ def clear(outer: Outline, step: float, height: float, feed: float, turn: int) ->
     for way in (turn, -turn, 0) if abs(apart) > LEAST_MM else ():
         yield outer.at(way * max(apart, 0.0), way * max(-apart, 0.0)), height, feed, None, 0
     count = math.ceil(half / step - LEAST_MM)
+    refuse_arc_if(count > MOST_LAYERS, "a pocket in too many rings", "a larger step")
     for index in range(count - 1, -1, -1):
         ring = outer.grown(-half * index / count)
         yield ring.at(0.0, -ring.width / 2.0), height, feed, None, 0

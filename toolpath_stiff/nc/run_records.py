@@ -24,6 +24,8 @@ def collector_at_rest() -> Iterator[None]:
         yield
     finally:
         if was:
+            gc.freeze()  # and back: what the run has made counts as old, so that no search begins now
+            gc.unfreeze()
             gc.enable()
 
 
@@ -43,6 +45,8 @@ class Subprogram:
         Of a repeated section the line after it; -1: it is a call.
     references
         Parameter -> where the variable is kept that it stands for, and its name there.
+    kept
+        Modes and frames that its end brings back (SAVE).
     """
 
     name: str
@@ -53,6 +57,7 @@ class Subprogram:
     modal: bool = False
     stop: int = -1
     references: Mapping[str, tuple[dict[Any, float | None], str]] = field(default_factory=dict)
+    kept: Mapping[str, object] = field(default_factory=dict)
 
 
 @dataclass

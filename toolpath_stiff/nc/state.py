@@ -138,20 +138,21 @@ class CurrentBlock:
     def add(self, letter: str, word: Word) -> None:
         """Add a word under its letter: each letter once, and values only up to a control's limit."""
         self.refuse_if(letter in self.values, word, "repeats a word of its block", "each word once")
-        of_axis = letter.lstrip("I@") in {*AXES}
-        largest = LARGEST_MM if of_axis else LARGEST_WORD
-        problem = "is beyond 100 m" if of_axis else "is beyond any number that a control takes"
-        self.refuse_if(abs(word.value) > largest, word, problem, f"at most {largest:.0f}")
+        if abs(word.value) > LARGEST_MM:
+            of_axis = letter.lstrip("I@") in {*AXES}
+            largest = LARGEST_MM if of_axis else LARGEST_WORD
+            problem = "is beyond 100 m" if of_axis else "is beyond any number that a control takes"
+            self.refuse_if(abs(word.value) > largest, word, problem, f"at most {largest:.0f}")
         self.values[letter] = word
         self.free.add(letter)
 
     @contextmanager
-    def placing(self, hint: str = "") -> Iterator[None]:
-        """Add the block's place, and a hint if given, to errors of geometry (`ArcError`)."""
+    def placing(self) -> Iterator[None]:
+        """Add the block's place to errors of geometry (`ArcError`)."""
         try:
             yield
         except ArcError as error:
-            raise self.fail(None, error.found, error.expected, hint) from None
+            raise self.fail(None, error.found, error.expected) from None
 
     def fail(self, culprit: Word | str | None, problem: str, expected: str = "", hint: str = "") -> InputError:
         """An error at a word of the block (given itself, or by code or letter), or at the block."""
@@ -202,8 +203,9 @@ class Conversational:
         Siemens' programmable frame without its shift: turn, mirror image, scale.
     renumbered
         Axes whose numbers changed while they stood, until they are named.
-    side, entry
-        G40, G41, G42 that waits for the next straight move; KONT or G451 in force, "" for NORM and G450.
+    side, entry, feed_place
+        G40, G41, G42 that waits for the next straight move; KONT or G451 in force, "" for NORM and G450; CFC (F holds
+        on arcs of contours), CFIN (on inside ones) or CFTCP in force, "": F is always the tool centre's.
     base
         G500 in force: "machine", or "zero" where the program takes no other offset; "": it is not.
     contour
@@ -218,7 +220,7 @@ class Conversational:
     corner: CurrentBlock | None = None
     approach: tuple[dict[int, float], Callable[[complex], None]] | None = None
     free: list[tuple[CurrentBlock, str, bool]] = field(default_factory=list)
-    closes: complex | None = None
+    closes: complex = complex(math.nan, math.nan)
     fast: bool = False
     to_corner: bool = False
     cycle: tuple[int, dict[str, float]] | None = None
@@ -245,6 +247,7 @@ class Conversational:
     renumbered: set[int] = field(default_factory=set)
     side: str = ""
     entry: str = ""
+    feed_place: str = ""
     base: str = ""
     contour: list[Element] = field(default_factory=list)
     offsets_named: bool = False

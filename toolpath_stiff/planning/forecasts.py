@@ -78,8 +78,6 @@ def forecast_all(
     readings: Readings,
     effect_files: Sequence[str | Path] = (),
     strut_spread: float = STRUT_SPREAD,
-    joint_error: float = JOINT_ERROR,
-    rest: float = REST,
 ) -> tuple[list[Forecast], BoolArray, FloatArray]:
     """Forecasts of the rivals, mask (m,) of readings that all of them predict, and the machine's own scatter.
 
@@ -93,8 +91,8 @@ def forecast_all(
     joints, tip = np.zeros((len(readings), 36)), readings.of_tip
     path = measured_path(predictor.base, tip)
     if isinstance(machine, Hexapod):
-        joints[readings.tip] = geometry_slopes(predictor.base, path, tip.direction)[:, 6:] * joint_error
-    shared = [strut_spread * predictor.strut_columns(), joints, rest * predictor.rest_columns()]
+        joints[readings.tip] = geometry_slopes(predictor.base, path, tip.direction)[:, 6:] * JOINT_ERROR
+    shared = [strut_spread * predictor.strut_columns(), joints, REST * predictor.rest_columns()]
     return forecasts, good, principal(np.concatenate(shared, axis=1))
 
 

@@ -101,13 +101,10 @@ class Expectation:
         Mean probability of the truth.
     settled
         How often the verdict is settled: one rival has the probability from which a diagnosis names it (`NAMED`).
-    settled_if
-        The same for each rival in turn, were it the truth; `settled` is their mean by the rivals' weights.
     """
 
     truth: float
     settled: float
-    settled_if: tuple[float, ...] = ()
 
 
 def expected_outcome(
@@ -138,7 +135,7 @@ def expected_outcome(
     means = np.stack([forecast.mean[rows] for forecast in forecasts], axis=1)
     whitened = solve_triangular(np.linalg.cholesky(covariance), means, lower=True).T
     standard = np.random.default_rng(seed).standard_normal((DRAWS, len(rows)))
-    truth, settled = 0.0, []
+    truth = settled = 0.0
     for i, weight in enumerate(weights):
         # Log likelihoods -|z + (m_i - m_j)|^2 / 2 for every j, z standard normal.
         apart = whitened[i] - whitened
@@ -146,5 +143,5 @@ def expected_outcome(
         probability = np.exp(logs - logs.max(axis=1, keepdims=True))
         probability /= probability.sum(axis=1, keepdims=True)
         truth += weight * float(probability[:, i].mean())
-        settled.append(float((probability.max(axis=1) >= NAMED).mean()))
-    return Expectation(truth, float(weights @ settled), tuple(settled))
+        settled += weight * float((probability.max(axis=1) >= NAMED).mean())
+    return Expectation(truth, settled)

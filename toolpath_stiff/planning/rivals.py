@@ -7,6 +7,7 @@ import numpy as np
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.candidates import Candidate, Component
+from toolpath_stiff.inference.entries import at_tip
 from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED, error_figures
 from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem
 from toolpath_stiff.inference.fits import baseline, fit_effects, refine
@@ -28,15 +29,19 @@ def rival_of_fit(name: str, fit: Fit, weight: float = 1.0) -> Rival:
 def rivals_of(judgement: Judgement) -> list[Rival]:
     """Explanations that a diagnosis leaves standing, with their probabilities, none below `LEAST_WEIGHT`.
 
-    Those that votes leave open have none of their own or a small one. Where no two stand, the likely others beside it,
+    Those that votes leave open have none of their own or a small one. Of pairs that no reading of the tip tells apart,
+    one. Where no two stand, the likely others beside it,
     at least the likeliest: what a plan would confirm the answer against.
     """
     likely = [name for name, weight in judgement.likely if weight >= LEAST_WEIGHT]
     names = judgement.explanations if len(judgement.explanations) > 1 else (*judgement.explanations, *likely)
-    rivals = dict[str, Rival]()
+    rivals, pairs = dict[str, Rival](), set[tuple[str, ...]]()
     for k, name in enumerate(dict.fromkeys([*names, NONE, *(family.name for family in judgement.families)])):
         if k >= len(names) and len(rivals) >= 2:
             break
+        if " + " in name and at_tip(name) in pairs:
+            continue
+        pairs.add(at_tip(name))
         if fit := _fit_of(judgement, name):
             rivals[name] = rival_of_fit(name, fit, max(judgement.probability.get(name, 0.0), LEAST_WEIGHT))
     return sorted(rivals.values(), key=lambda rival: (-rival.weight, rival.name))
@@ -76,7 +81,7 @@ def fitted_rivals(problem: Problem, names: Sequence[str], effects: Mapping[str, 
         family = score_family(problem, effects[name], base)
         if family is None or family.best is None:
             raise InputError(
-                f"fitted to these data, {name} comes out at nothing: it is no other explanation than {NONE}",
+                f"fitted to these data, the size of {name} is zero: it is no other explanation than {NONE}",
                 hint="plan without data (leave the files out) for the size that it usually has",
             )
         rivals.append(rival_of_fit(name, refine(problem, family.best)))
@@ -157,7 +162,7 @@ def rivals_on_elements(fits: Sequence[Fit], standing: Sequence[Fit], between: Se
     """
     by_name = {rival_name(fit): fit for fit in fits}
     if missing := [name for name in between if name not in by_name]:
-        mistake = f"--between {missing[0]}: fitted to these data it comes out at nothing"
+        mistake = f"--between {missing[0]}: fitted to these data its size is zero"
         raise InputError(mistake, expected=f"some of {', '.join(by_name)}")
     chosen = [by_name[name] for name in between] or [*standing, *(fit for fit in fits if fit not in standing)]
     chosen = chosen[: max(len(between) or len(standing), 2)]

@@ -53,8 +53,6 @@ class LoopFigures:
     linearity
         Largest departure of the deflection from the secant on the way from extreme to extreme, as a share of the
         deflection between them.
-    closure
-        m, deflection at the end less that at the beginning.
     tension, compression
         N/m, slopes of the two sides of a strut on a bench.
     """
@@ -66,7 +64,6 @@ class LoopFigures:
     lost_motion: float = math.nan
     loop_width: float = math.nan
     linearity: float = math.nan
-    closure: float = math.nan
     tension: float = math.nan
     compression: float = math.nan
 
@@ -103,7 +100,6 @@ def reduce_loop(loop: Loop) -> LoopFigures:
         lost_motion=_lost_motion(cycle),
         loop_width=width,
         linearity=float(np.abs(main - secant).max() / deflection),
-        closure=float(loop.deflection[-1] - loop.deflection[0]),
         tension=tension,
         compression=compression,
     )

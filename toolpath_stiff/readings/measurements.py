@@ -169,7 +169,7 @@ def lacking_columns(effects: Iterable[Effect], missing: Collection[str]) -> dict
 
 
 def read_measurements(
-    paths: str | Path | Iterable[str | Path], machine: MachineTool, planned: bool = False, columns: Mapped = None
+    paths: str | Path | Iterable[str | Path], machine: MachineTool, columns: Mapped = None
 ) -> Readings:
     """Read measurement files.
 
@@ -179,8 +179,6 @@ def read_measurements(
         One or several files, CSV or .xlsx (`FILE.xlsx#SHEET`); `nist-table1` is the paper's Table 1.
     machine
         The machine that was measured; its poses are checked against it.
-    planned
-        Whether the stiffness may be left empty.
     columns
         Columns that the files name differently, as `mapping` says.
 
@@ -202,7 +200,7 @@ def read_measurements(
     for name in names:
         try:
             table = _table_1() if name == NIST_TABLE_1 else mapped_table(name, "measurements", COLUMNS, columns)
-            of_file, remarks = read_rows(table, planned, SOFTEST if isinstance(machine, Hexapod) else SOFTEST_ARM)
+            of_file, remarks = read_rows(table, SOFTEST if isinstance(machine, Hexapod) else SOFTEST_ARM)
             rows += of_file
             notes += remarks
         except InputErrors as bad:  # errors of all files are reported together

@@ -26,8 +26,6 @@ from toolpath_stiff.results import DataFrame, Result, frame_of
 from toolpath_stiff.tables import Table
 from toolpath_stiff.units import n_per_m_from_n_per_mm
 
-READ = (".csv", ".txt", ".dat", ".asc", ".tsv", ".xlsx", ".xlsm")  # of a folder
-OWN_OUTPUT = "_measurements.csv"
 FAILED = 0.05  # share of a table's rows that may be failed tests, near zero; if more, the unit is wrong; assumed
 
 
@@ -117,7 +115,7 @@ def reduce(*raw: str | Path, columns: Mapped = None, compression_positive: bool 
     Parameters
     ----------
     raw
-        Files and folders of them: CSV, or FILE.xlsx[#SHEET]. Of struts on a bench also tables of their stiffnesses.
+        Files: CSV, or FILE.xlsx[#SHEET]. Of struts on a bench also tables of their stiffnesses.
     columns
         Columns that the files name differently: "strut=hp, date=day_ms:ms, force=Kraft:kN", or such a dict; unless
         given, as FILE.columns.toml beside a file says.
@@ -148,7 +146,7 @@ def reduce(*raw: str | Path, columns: Mapped = None, compression_positive: bool 
     notes: list[str] = []
     read_as: list[str] = []
     errors: list[InputError] = []
-    for file in (file for name in raw for file in _files(str(name))):
+    for file in map(str, raw):
         table = mapped_table(file, "raw records", COLUMNS, columns)
         if STIFFNESS[0] in table.heading and "displacement_um" not in table.heading:
             reduced, remarked = read_strut_table(table)
@@ -171,17 +169,6 @@ def reduce(*raw: str | Path, columns: Mapped = None, compression_positive: bool 
     return Reduction(
         tuple(map(str, raw)), tuple(figures), [*notes, *remarks(figures, over_time)], tuple(read_as), over_time
     )
-
-
-def _files(name: str) -> list[str]:
-    """A file, or the files of a folder and its subfolders, in order of name."""
-    if not Path(name).is_dir():
-        return [name]
-    paths = sorted(p for p in Path(name).rglob("*") if p.suffix.lower() in READ and not p.name.startswith((".", "~")))
-    files = [str(path) for path in paths if not path.name.endswith(OWN_OUTPUT)]
-    if not files:
-        raise InputError("a folder without records", expected=f"files {', '.join(READ)}", file=name)
-    return files
 
 
 def read_strut_table(table: Table) -> tuple[list[LoopFigures], list[str]]:

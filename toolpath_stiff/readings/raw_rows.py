@@ -64,7 +64,7 @@ def remarks(figures: Sequence[LoopFigures], over_time: StrutHistory) -> Iterator
 
 
 # Columns of a measurement file beyond the stiffness.
-FURTHER = ("lost_motion_um", "loop_width_um", "linearity_percent", "closure_um")
+FURTHER = ("lost_motion_um", "loop_width_um", "linearity_percent")
 
 
 def _in_shop_units(figures: LoopFigures) -> dict[str, float]:
@@ -78,7 +78,6 @@ def _in_shop_units(figures: LoopFigures) -> dict[str, float]:
         "lost_motion_um": um_from_m(figures.lost_motion),
         "loop_width_um": um_from_m(figures.loop_width),
         "linearity_percent": 100.0 * figures.linearity,
-        "closure_um": um_from_m(figures.closure),
     }
 
 

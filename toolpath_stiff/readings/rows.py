@@ -106,15 +106,13 @@ def refuse_pulls(table: Table) -> None:
         )
 
 
-def read_rows(table: Table, planned: bool = False, softest: float = SOFTEST) -> tuple[list[Row], list[str]]:
+def read_rows(table: Table, softest: float = SOFTEST) -> tuple[list[Row], list[str]]:
     """Rows of a measurement file; and remarks on what was not used.
 
     Parameters
     ----------
     table
         As `tables.read_table` reads it with `COLUMNS`.
-    planned
-        Whether the stiffness may be left empty (a plan of measurements).
     softest
         N/mm that a machine has at least.
 
@@ -127,7 +125,7 @@ def read_rows(table: Table, planned: bool = False, softest: float = SOFTEST) -> 
     """
     file, heading, line = table.file, table.heading, table.heading_line
     refuse_pulls(table)
-    check_needed(table, _needed(heading, planned), "one row a reading: x_mm,y_mm,z_mm,direction,stiffness_N_per_mm")
+    check_needed(table, _needed(heading), "one row a reading: x_mm,y_mm,z_mm,direction,stiffness_N_per_mm")
     fault = "a column without a name" if "" in heading else "" if table.rows else "no rows below the heading"
     if "direction" in heading and "dx" in heading:
         fault = "two directions: direction, and dx,dy,dz"
@@ -135,7 +133,7 @@ def read_rows(table: Table, planned: bool = False, softest: float = SOFTEST) -> 
         raise MeasurementError(fault, file=file, line=line)
     further = [name for name in heading if name not in KNOWN and _all_numbers(table, heading.index(name))]
     unused = [name for name in heading if name not in (*KNOWN, *further)]
-    rows, errors = parsed_rows(table, lambda line, record: _row(record, further, file, line, planned, softest))
+    rows, errors = parsed_rows(table, lambda line, record: _row(record, further, file, line, softest))
     errors += duplicates(rows)
     if errors:
         raise InputErrors(sorted(errors, key=lambda error: error.line or 0))
@@ -154,7 +152,7 @@ def parsed_rows(table: Table, parse: Callable[[int, dict[str, str]], Parsed]) ->
     return parsed, errors
 
 
-def _needed(heading: Sequence[str], planned: bool) -> tuple[str, ...]:
+def _needed(heading: Sequence[str]) -> tuple[str, ...]:
     """Columns that a heading needs: three angles and three components of a direction, or none of them."""
     groups = tuple(name for group in (ANGLES, VECTOR) if not {*group}.isdisjoint(heading) for name in group)
     bench = "loop" in heading  # a strut on a bench has neither pose nor direction
@@ -163,7 +161,7 @@ def _needed(heading: Sequence[str], planned: bool) -> tuple[str, ...]:
         *(() if bench else POSITION),
         *groups,
         *(() if bench or VECTOR[0] in heading else ("direction",)),
-        *(() if planned or loaded else ("stiffness_N_per_mm",)),
+        *(() if loaded else ("stiffness_N_per_mm",)),
     )
 
 
@@ -174,7 +172,7 @@ def _all_numbers(table: Table, column: int) -> bool:
         return False
 
 
-def _row(record: Mapping[str, str], further: Sequence[str], file: str, line: int, planned: bool, softest: float) -> Row:
+def _row(record: Mapping[str, str], further: Sequence[str], file: str, line: int, softest: float) -> Row:
     loop = loop_of(record.get("loop", ""))
     day_of(record.get(DATE, ""))  # raises for a text that is no date
     # A strut on a bench has neither pose nor direction.
@@ -196,15 +194,15 @@ def _row(record: Mapping[str, str], further: Sequence[str], file: str, line: int
         extra={name: float(record[name]) for name in further},
     )
     if loop != TIP:
-        return _beside_tip(row, record, loop, planned)
-    return replace(row, stiffness=n_per_m_from_n_per_mm(_stiffness(record, row.force, planned, softest)))
+        return _beside_tip(row, record, loop)
+    return replace(row, stiffness=n_per_m_from_n_per_mm(_stiffness(record, row.force, softest)))
 
 
 def _angle(record: Mapping[str, str], name: str) -> float:
     return rad_from_deg(number(record, name)) if name in record else 0.0
 
 
-def _beside_tip(row: Row, record: Mapping[str, str], loop: MeasuringLoop, planned: bool) -> Row:
+def _beside_tip(row: Row, record: Mapping[str, str], loop: MeasuringLoop) -> Row:
     """Row with the reading of an indicator beside the tip.
 
     Raises
@@ -225,17 +223,15 @@ def _beside_tip(row: Row, record: Mapping[str, str], loop: MeasuringLoop, planne
     given = [name for name in LOOP_BOUNDS if record.get(name)]
     values = [number(record, name, LOOP_BOUNDS[name]) for name in given]
     lacking = math.isnan(force) if given == ["displacement_um"] else given != ["stiffness_N_per_mm"] or not values[0]
-    if lacking and not (planned and not given):
+    if lacking:
         raise MeasurementError(
             f"loop {loop}: no reading", expected="displacement_um with force_N, or else stiffness_N_per_mm, not 0"
         )
-    compliance = math.nan
-    if given:
-        compliance = m_from_um(values[0]) / force if given == ["displacement_um"] else 1e-3 / values[0]
+    compliance = m_from_um(values[0]) / force if given == ["displacement_um"] else 1e-3 / values[0]
     # A signed direction reverses a reading that is not taken along the load.
     if record.get("direction", "").startswith("-") and not (loop.along_load or alone):
         compliance = -compliance
-    if alone and not (planned or 1e-3 / STIFFEST <= compliance <= 1e-3 / SOFTEST):
+    if alone and not 1e-3 / STIFFEST <= compliance <= 1e-3 / SOFTEST:
         expected = f"{1e6 / STIFFEST:g} to {1e6 / SOFTEST:g} nm/N; longer under tension is positive"
         raise MeasurementError(f"loop {loop}: {1e9 * compliance:.4g} nm/N", expected=expected)
     return replace(
@@ -248,13 +244,13 @@ def _beside_tip(row: Row, record: Mapping[str, str], loop: MeasuringLoop, planne
     )
 
 
-def _stiffness(record: Mapping[str, str], force: float, planned: bool, softest: float) -> float:
-    """N/mm of a reading of the tip; nan for a planned one."""
+def _stiffness(record: Mapping[str, str], force: float, softest: float) -> float:
+    """N/mm of a reading of the tip."""
     given = record.get("stiffness_N_per_mm")
     printed = number(record, "stiffness_N_per_mm", (softest, STIFFEST)) if given else math.nan
     displacement = optional_number(record, "displacement_um")
     quotient = force / (displacement / 1e3)  # N/mm
-    if math.isnan(printed) and math.isnan(quotient) and not planned:
+    if math.isnan(printed) and math.isnan(quotient):
         raise MeasurementError("no stiffness", expected="stiffness_N_per_mm, or force_N and displacement_um")
     if abs(quotient - printed) > AGREEMENT * printed or quotient < softest or quotient > STIFFEST:
         raise MeasurementError(

@@ -11,7 +11,7 @@ from toolpath_stiff.report.history import history_text
 from toolpath_stiff.report.tables import ShownTable
 
 DATA: Mapping[str, Callable[[Reduction], Content]] = {}
-HEAD = ("loop", ">N/mm", ">force N", ">deflection um", ">lost motion um", ">width um", ">linearity %", ">closure um")
+HEAD = ("loop", ">N/mm", ">force N", ">deflection um", ">lost motion um", ">width um", ">linearity %")
 
 
 def pictures(reduction: Reduction) -> dict[str, Content]:
@@ -29,7 +29,7 @@ def text(reduction: Reduction) -> str:
 def _loops(entries: Sequence[Document]) -> list[str]:
     if not entries:
         return []
-    names = ("deflection_um", "lost_motion_um", "loop_width_um", "linearity_percent", "closure_um")
+    names = ("deflection_um", "lost_motion_um", "loop_width_um", "linearity_percent")
     rows = [
         (
             entry["loop"],

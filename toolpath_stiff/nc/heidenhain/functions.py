@@ -66,8 +66,8 @@ def miscellaneous(state: State, block: CurrentBlock) -> None:
                 state.note(block.line, word, CODES[letter].listed)
         elif letter in PASSIVE or letter in REFUSED:
             state.note(block.line, word, PASSIVE.get(letter) or REFUSED[letter])
-            if letter in ("M103", "M112", "M118", "M120", "M124", "M101"):
-                for other in (*OF_M, *AXES) if letter == "M118" else OF_M:
+            if letter in ("M103", "M112", "M118", "M120", "M124", "M101", "M138"):
+                for other in (*OF_M, *(AXES if letter == "M118" else [f"{axis}!" for axis in AXES])):
                     block.take(other)
         else:
             state.note_unknown(block.line, word)
@@ -80,12 +80,14 @@ def retract(state: State, block: CurrentBlock) -> None:
     block.refuse_if(axis, axis, "beside M140", "a statement of its own for it")
     feed_given, rapid = block.has("F"), feed(state, block)
     normal, distance = PLANES[state.plane][2], block.take("MB")
+    leans = state.plain.tilt is None and any(state.frames.position[3:5])
     if distance is None:
         block.refuse_if(block.take("MBMAX") is None, "M140", "without its distance", "MB50 or MB MAX")
         if RETRACT not in [remark.text for remark in state.warnings]:
             state.warnings.append(Remark(RETRACT, block.line))
-        state.plain.unknown.add(normal)
+        state.plain.unknown |= {0, 1, 2} if leans else {normal}
         return
+    block.refuse_if(leans, "M140", "along a tool that leans", "X, Y and Z in an L statement")
     there = present(state)[normal] + distance * state.length_scale
     go(state, block, {normal: there}, rapid=rapid or not feed_given)
 

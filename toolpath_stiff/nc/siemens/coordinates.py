@@ -5,6 +5,8 @@ Job Planning, "Transformations"; Operating Manual Milling, "Swivel". A point goe
 swivelled one, then the settable offset. mm, degrees.
 """
 
+from collections.abc import Mapping
+
 from toolpath_stiff.nc.codes import coordinates as settable
 from toolpath_stiff.nc.codes import tools
 from toolpath_stiff.nc.frames import rotation_matrix
@@ -17,6 +19,7 @@ from toolpath_stiff.nc.tables import WORK_OFFSETS, WorkOffset
 from toolpath_stiff.nc.words import AXES
 
 BASE_IS_ZERO = "G500 (no settable offset) is program zero: the program takes no other one"
+MODES = ("motion", "plane", "absolute", "inch", "feed_mode")  # of SAVE
 FIRST_ADDITIONAL, LAST_OF_FOUR = 505, 4
 G70_INCH = "under G70 F counts inches a minute too, as on a control whose basic system is inch"
 
@@ -75,6 +78,19 @@ def offset(state: State, block: CurrentBlock, code: str) -> None:
     else:
         settable.work_offset(state, block, code)
     frames.g92 = list(frames.g92)  # the coordinates of the present point change
+
+
+def modes_of(state: State) -> dict[str, object]:
+    """Modes and frames in force, which the end of a subprogram with SAVE brings back."""
+    plain, frames = state.plain, state.frames
+    return {name: getattr(state, name) for name in MODES} | {"": (plain.inner, plain.base, frames.g92, frames.active)}
+
+
+def bring_back(state: State, kept: Mapping[str, object]) -> bool:
+    """Put modes that were kept into force again; False if the frames have changed."""
+    for name in MODES:
+        setattr(state, name, kept[name])
+    return kept[""] == modes_of(state)[""]
 
 
 def set_offset(state: State, block: CurrentBlock, code: str) -> None:

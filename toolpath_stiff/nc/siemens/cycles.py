@@ -62,7 +62,9 @@ def modal(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def parameters(state: State, block: CurrentBlock, code: str) -> Values:
-    """The parameters that a cycle's call gives, lengths in mm; now taken."""
+    """The parameters that a cycle's call gives, lengths in mm; now taken. If they name a plane, it is in force."""
+    plane = round(block.values["DMODE"].value) % 10 if block.has("DMODE") else 0
+    block.refuse_if(plane not in (0, int(state.plane[1:]) - 16), "DMODE", "names another plane", "the one in force")
     given, scale = [name for name in SIGNATURES[code].split() if block.has(name)], state.length_scale
     return {name: (block.take(name) or 0.0) * (scale if name in LENGTHS else 1.0) for name in given}
 

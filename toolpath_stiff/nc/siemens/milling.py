@@ -7,9 +7,9 @@ Walls, floors and their allowances are the cycle's; the way over what lies betwe
 
 import math
 from collections import defaultdict
+from collections.abc import Callable, Iterator
 
-from toolpath_stiff.nc.geometry import PLANES
-from toolpath_stiff.nc.heidenhain.contour import check_known, mill, tool_radius
+from toolpath_stiff.nc.heidenhain.contour import mill, tool_radius
 from toolpath_stiff.nc.heidenhain.cycles import Values
 from toolpath_stiff.nc.heidenhain.points import in_plane, outside_contour, present
 from toolpath_stiff.nc.moves import Remark
@@ -29,7 +29,7 @@ PLUNGES = ("", "", "helix", "ramp")  # tens of VARI of pockets: at rapid, at fee
 
 def digit(value: float, place: int) -> int:
     """A decimal digit, counted from the last."""
-    return int(abs(value)) // 10**place % 10
+    return int(f"{int(abs(value)):09d}"[-1 - place])
 
 
 def begin(state: State, block: CurrentBlock, code: str) -> tuple[Values, float]:
@@ -49,7 +49,6 @@ def begin(state: State, block: CurrentBlock, code: str) -> tuple[Values, float]:
     corners = any(digit(values["GMODE"], place) > 1 for place in range(6))
     block.refuse_if(corners, "GMODE", "measures from a corner, or mills what another tool has left", "11100")
     outside_contour(state, block, code, state.plain.side)
-    check_known(state, block, {PLANES[state.plane][2]: 0.0}, rapid=True)
     radius = tool_radius(state, block, code) / state.plain.scale
     block.refuse_if(not radius, None, f"{code} with a tool of no radius", "D1 before it, and its diameter")
     if all(remark.text != OUR_WAY for remark in state.warnings):
@@ -57,12 +56,25 @@ def begin(state: State, block: CurrentBlock, code: str) -> tuple[Values, float]:
     return values, radius
 
 
-def _outline(block: CurrentBlock, values: Values, code: str) -> Outline:
+def approached(state: State, values: Values, start: complex) -> list[Cut]:
+    """Rapids at the retraction plane to above the start of a path, and down to the safety distance."""
+    known = [] if state.plain.unknown else [(in_plane(state, present(state)), "RTP")]
+    return [(place, values[height], None, None, 0) for place, height in (*known, (start, "RTP"), (start, "TOP"))]
+
+
+def mill_area(state: State, block: CurrentBlock, code: str) -> None:
+    """POCKET3, POCKET4, CYCLE61, CYCLE71, CYCLE76, CYCLE77: at the place that their parameters give."""
+    values, radius = begin(state, block, code)
+    path = list(PATHS[code](state, block, code, values, radius))
+    mill(state, block, [*approached(state, values, path[0][0]), *path, (path[-1][0], values["RTP"], None, None, 0)])
+
+
+def _outline(block: CurrentBlock, code: str, values: Values) -> Outline:
     """The rectangle or circle of a pocket or spigot."""
-    diameter = {"POCKET4": 2.0, "CYCLE77": 1.0}.get(code, 0.0) * values["PRAD"]
-    length, width, corner = (
-        (diameter, diameter, diameter / 2.0) if diameter else (values["LENG"], values["WID"], values["CRAD"])
-    )
+    length, width, corner = values["LENG"], values["WID"], values["CRAD"]
+    if values["PRAD"]:  # of a spigot its diameter
+        length = width = values["PRAD"] * (2.0 if code == "POCKET4" else 1.0)
+        corner = length / 2.0
     fits = 0.0 <= corner <= min(length, width) / 2.0 + 1e-9 and min(length, width) > 0.0
     block.refuse_if(not fits, None, f"{code} measured from a corner, or of no size", "sizes above 0, from the middle")
     return Outline(complex(values["_PA"], values["_PO"]), length, width, corner, math.radians(values["STA"]))
@@ -82,96 +94,68 @@ def _step(state: State, block: CurrentBlock, values: Values, radius: float) -> f
     return abs(values["MIDA"]) * unit or STEP_SHARE * 2.0 * radius
 
 
-def approached(state: State, values: Values, start: complex) -> list[Cut]:
-    """Rapids at the retraction plane to above the start of a path, and down to the safety distance."""
-    places = ((in_plane(state, present(state)), "RTP"), (start, "RTP"), (start, "TOP"))
-    return [(place, values[height], None, None, 0) for place, height in places]
-
-
-def mill_pocket(state: State, block: CurrentBlock, code: str) -> None:
-    """POCKET3, POCKET4: rough with the allowances, or finish the wall (where FAL was left) and the floor (FALD)."""
-    values, radius = begin(state, block, code)
-    outline, turn, step = (
-        _outline(block, values, code),
-        _turn(state, block, values),
-        _step(state, block, values, radius),
-    )
-    kind, way, rough = digit(values["VARI"], 0), digit(values["VARI"], 1), digit(values["VARI"], 0) == ROUGH
-    there = any(values[name] for name in ("AP1", "AP2", "AD")) and not digit(values["GMODE"], 4)
-    block.refuse_if(there, None, f"{code} in a pocket that is there (AP1, AP2, AD)", "0 for these")
-    block.refuse_if(code == "POCKET4" and digit(values["DMODE"], 2), "DMODE", "counts PRAD otherwise", "a radius")
-    block.refuse_if(way > 3 or values["VARI"] >= 100.0, "VARI", "plunges in a way that is not known", "1 to 34")
-    nothing = kind == FINISH and not values["FAL"] and not values["FALD"]
-    block.refuse_if(nothing, None, f"{code} finishes where FAL and FALD leave nothing", "FAL or FALD")
-    inner, wall = outline.grown(-radius - values["FAL"] * rough), outline.grown(-radius)
-    block.refuse_if(
-        min(inner.length, inner.width) < 0.0, None, f"{code}: the tool does not fit in it", "a smaller tool"
-    )
-    size, slope = values["RAD1"] * state.length_scale, values["DP1"]
-    if PLUNGES[way] == "ramp":
-        size, slope = inner.length / 2.0, math.radians(values["RAD1"])
-    block.refuse_if(way > 1 and not (size > 0.0 < slope), None, f"{code} plunges without its sizes", "RAD1, DP1")
+def _pocket(state: State, block: CurrentBlock, code: str, values: Values, radius: float) -> Iterator[Cut]:
+    """Rough with the allowances, or finish the wall (where FAL was left) and the floor (FALD)."""
+    outline, turn = _outline(block, code, values), _turn(state, block, values)
+    step, kind, way = _step(state, block, values, radius), digit(values["VARI"], 0), digit(values["VARI"], 1)
+    inner, wall = (outline.grown(-radius - values["FAL"] * share) for share in (kind == ROUGH, 0.0))
+    size, slope, least = values["RAD1"] * state.length_scale, values["DP1"], min(inner.length, inner.width)
+    if PLUNGES[way % len(PLUNGES)] == "ramp":
+        size, slope = inner.length / 2.0, math.radians(min(values["RAD1"], 80.0))
+    for name, wrong, problem, expected in (
+        ("AP1", not digit(values["GMODE"], 4) and values["AP1"] + values["AP2"] + values["AD"], "is of a pocket", "0"),
+        ("DMODE", code == "POCKET4" and digit(values["DMODE"], 2), "counts PRAD otherwise", "a radius"),
+        ("VARI", way > 3 or values["VARI"] >= 100.0, "plunges in a way that is not known", "1 to 34"),
+        ("VARI", kind == FINISH and not values["FAL"] + values["FALD"], "finishes nothing", "FAL, FALD"),
+        ("VARI", way > 1 and not (size > 0.0 < slope), "plunges without its sizes", "RAD1, DP1"),
+        (None, least < 0.0, f"{code} narrower than the tool", "a smaller tool"),
+    ):
+        block.refuse_if(wrong, name, problem, expected)
     heights = layers(values["TOP"], values["FLOOR"], values["MID"]), values["TOP"], values["TOP"] - values["RFP"]
-    feed, down, path = values["FFP1"], values["FFD"], approached(state, values, outline.middle)
-    if rough:
-        path += pocket(inner, step, heights, (feed, down if way else None), turn, (PLUNGES[way], size, slope))
+    feed, down = values["FFP1"], values["FFD"]
+    yield outline.middle, values["TOP"], None, None, 0
+    if kind == ROUGH:
+        yield from pocket(inner, step, heights, (feed, down if way else None), turn, (PLUNGES[way], size, slope))
     elif kind == WALL or values["FAL"]:
-        path += edge(
-            wall, heights, (feed, None), turn, min(max(LEAD_MM, values["FAL"]), min(wall.length, wall.width) / 2.0)
-        )
+        yield from edge(wall, heights, (feed, None), turn, min(max(LEAD_MM, values["FAL"]), least / 2.0))
     if kind == FINISH and values["FALD"]:
-        path += pocket(wall, step, ([values["DP"]], *heights[1:]), (feed, down), turn, ("", 0.0, 0.0))
-    mill(state, block, [*path, (path[-1][0], values["RTP"], None, None, 0)])
+        yield from pocket(wall, step, ([values["DP"]], *heights[1:]), (feed, down), turn, ("", 0.0, 0.0))
 
 
-def mill_spigot(state: State, block: CurrentBlock, code: str) -> None:
-    """CYCLE76, CYCLE77: round a rectangle or a circle at each depth, from the blank inward; finished in one round."""
-    values, radius = begin(state, block, code)
-    outline, turn, rough = (
-        _outline(block, values, code),
-        _turn(state, block, values, -1),
-        digit(values["VARI"], 0) == ROUGH,
-    )
-    nearest = outline.grown(radius + values["FAL"] * rough)
-    beyond = (
-        max(values["AP1"] - max(values["LENG"], values["PRAD"]), values["AP2"] - values["WID"]) / 2.0 - values["FAL"]
-    )
-    count = max(1, math.ceil(beyond / (STEP_SHARE * 2.0 * radius) - 1e-9)) if rough else 1
+def _spigot(state: State, block: CurrentBlock, code: str, values: Values, radius: float) -> Iterator[Cut]:
+    """Once round it at each depth: what the blank has beyond the tool's width is taken to be gone."""
+    rough, outline = digit(values["VARI"], 0) == ROUGH, _outline(block, code, values)
     floors = layers(values["TOP"], values["FLOOR" if rough else "DP"], values["MID"])
-    heights, feeds, path = (
-        (floors, values["TOP"], values["TOP"] - values["RFP"]),
-        (values["FFP1"], values["FFD"]),
-        list[Cut](),
-    )
-    for index in range(count - 1, -1, -1):
-        path += edge(nearest.grown(index * beyond / count), heights, feeds, turn, -radius)
-    mill(state, block, [*approached(state, values, path[0][0]), *path, (path[-1][0], values["RTP"], None, None, 0)])
+    heights, turn = (floors, values["TOP"], values["TOP"] - values["RFP"]), _turn(state, block, values, -1)
+    path = outline.grown(radius + values["FAL"] * rough)
+    yield from edge(path, heights, (values["FFP1"], values["FFD"]), turn, -radius)
 
 
-def mill_face(state: State, block: CurrentBlock, code: str) -> None:
-    """CYCLE71, CYCLE61: rows over a rectangle from its corner, in one direction or to and fro, layer by layer."""
-    values, radius = begin(state, block, code)
-    rows, top, feed = digit(values["VARI"], 1), values["TOP"], values["FFP1"]
-    corner, absolute = complex(values["_PA"], values["_PO"]), code == "CYCLE61"
-    long = values["LENG"] - corner.real * (absolute and digit(values["AMODE"], 3))
-    wide = values["WID"] - corner.imag * (absolute and digit(values["AMODE"], 4))
-    block.refuse_if(not long or not wide, None, f"{code} without its size", "LENG and WID")
+def _face(state: State, block: CurrentBlock, code: str, values: Values, radius: float) -> Iterator[Cut]:
+    """Rows over a rectangle from its corner, in one direction or to and fro, layer by layer."""
+    rows, absolute = digit(values["VARI"], 1), [code == "CYCLE61" and digit(values["AMODE"], n) for n in (3, 4)]
+    size = values["LENG"] - values["_PA"] * absolute[0], values["WID"] - values["_PO"] * absolute[1]
+    block.refuse_if(not all(size), None, f"{code} without its size", "LENG and WID")
     block.refuse_if(values["LIM"], "LIM", "limits the face by walls", "0")
     block.refuse_if(rows not in (1, 2, 3, 4), "VARI", "names no direction of the rows", "11 to 42")
-    run, across = (wide, long) if rows in (2, 4) else (long, wide)
+    run, across = size[::-1] if rows in (2, 4) else size
     over, count = radius + abs(values["FDP"]), math.ceil(abs(across) / _step(state, block, values, radius) - 1e-9)
-    floors = layers(top, values["FLOOR"], values["MID"]) if digit(values["VARI"], 0) == ROUGH else [values["DP"]]
-    face, path = Outline(corner, 0.0, 0.0, 0.0, math.radians(values["STA"])), list[Cut]()
-    for floor in floors:
+    face = Outline(complex(values["_PA"], values["_PO"]), 0.0, 0.0, 0.0, math.radians(values["STA"]))
+    rough = digit(values["VARI"], 0) == ROUGH
+    for floor in layers(values["TOP"], values["FLOOR" if rough else "DP"], values["MID"] * rough):
         for index in range(count):
-            ends = [math.copysign(1.0, run) * end for end in (-over, abs(run) + over)]
-            row, back = across * (index + 0.5) / count, rows > 2 and index % 2
-            places = [
-                face.at(row, end) if rows in (2, 4) else face.at(end, row) for end in (ends[::-1] if back else ends)
-            ]
+            ends = [math.copysign(end, end * run) for end in (-over, abs(run) + over)]
+            row, way = across * (index + 0.5) / count, -1 if rows > 2 and index % 2 else 1
+            first, last = (face.at(row, end) if rows in (2, 4) else face.at(end, row) for end in ends[::way])
             if rows < 3 or not index:  # from above, beside the face
-                path += [(places[0], top, None, None, 0), (places[0], floor, None, None, 0)]
-            path += [(place, floor, feed, None, 0) for place in places]
+                yield first, values["TOP"], None, None, 0
+                yield first, floor, None, None, 0
+            yield first, floor, values["FFP1"], None, 0
+            yield last, floor, values["FFP1"], None, 0
             if rows < 3 or index + 1 == count:
-                path += [(places[1], top, None, None, 0)]
-    mill(state, block, [*approached(state, values, path[0][0]), *path, (path[-1][0], values["RTP"], None, None, 0)])
+                yield last, values["TOP"], None, None, 0
+
+
+PATHS: dict[str, Callable[[State, CurrentBlock, str, Values, float], Iterator[Cut]]] = {
+    "POCKET3": _pocket, "POCKET4": _pocket, "CYCLE61": _face, "CYCLE71": _face, "CYCLE76": _spigot, "CYCLE77": _spigot,
+}  # fmt: skip

@@ -20,6 +20,7 @@ from toolpath_stiff.nc.plain_words import PlainWords
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.run_records import Subprogram, Tally, beyond_the_end
 from toolpath_stiff.nc.siemens.blocks import carry_out, draw, sort_words
+from toolpath_stiff.nc.siemens.coordinates import bring_back, modes_of
 from toolpath_stiff.nc.siemens.expressions import NAME, SiemensScanner
 from toolpath_stiff.nc.siemens.programs import PROGRAM, heads_of, labels_of, plain_texts, programs_of
 from toolpath_stiff.nc.siemens.vocabulary import meaning_of
@@ -36,6 +37,7 @@ BY_TEXT, PATH = ("CALL", "EXTCALL"), re.compile(r"^(?:.*/)?(?:_N_)?|[._][SM]PF$"
 TIMES = re.compile(r"P(?=\s*[=\d(])")
 PARAMETER = re.compile(r"(VAR\s+)?(REAL|INT|BOOL)\s+(\w+)\s*(\[[^]]*\])?(?:\s*=\s*([^,)]+))?", re.ASCII)
 ELEMENT, INDEX = re.compile(r"\[[\d,]+\]"), re.compile(r"(?<=[\[,])[A-Z_]\w*(?=[\],])", re.ASCII)
+R_PARAMETER = re.compile(r"R\[?(\d+)\]?")
 SECTION = re.compile(r"(REPEATB?)\s+(\w+)(?:\s+(?!P\s*=)(\w+))?", re.ASCII)
 END_OF_FILE, SUFFIXES = "%_N__END_SPF", (".SPF", ".MPF", "")
 SEARCHED = ("$P_SEARCH", "$P_SEARCHL", "$P_ISTEST", "$P_SIM", "$P_DRYRUN")
@@ -63,7 +65,7 @@ class SiemensRun(ParametricRun):
         plain, text = self.state.plain, "\n".join(map(code_text, self.lines))
         self._of_lathe = None if ALONG_Y.search(text) else OF_LATHES.search(text)
         plain.offsets_named, plain.changes_by_t = OFFSET.search(text) is not None, CHANGE.search(text) is None
-        self.state.motion = "G1"  # a control's state at power-on
+        self.state.motion, plain.feed_place = "G1", "CFC"  # a control's state at power-on
 
     def _lex(self) -> None:
         """Find programs and labels; plain blocks are left to the reader of plain lines."""
@@ -123,8 +125,8 @@ class SiemensRun(ParametricRun):
 
     def _scope(self, name: str) -> tuple[Values, str]:
         """Dictionary that holds a variable (R parameters: common to all programs), and its key, index as number."""
-        name = INDEX.sub(self._index, name)
-        parameter, base = re.fullmatch(r"R\[?(\d+)\]?", name), name.partition("[")[0]
+        name = INDEX.sub(self._index, name) if "[" in name else name
+        parameter, base = R_PARAMETER.fullmatch(name), name.partition("[")[0]
         if parameter:
             return self.variables.common, f"R{parameter[1]}"
         called = next((level for level in reversed(self._levels) if level.stop < 0), None)
@@ -189,9 +191,8 @@ class SiemensRun(ParametricRun):
 
     def _contour(self, block: CurrentBlock) -> Iterator[Block]:
         """Blocks of the contour of CYCLE72: those of a subprogram ("NAME"), or between labels ("BEGIN:END")."""
-        name = block.values["KNAME"].text.upper() if block.has("KNAME") else ""
-        block.take("KNAME")
-        first, _, last = (part.strip() for part in name.partition(":"))
+        block.refuse_if(block.take("KNAME") is None, None, "CYCLE72 without its contour", "its name, or labels")
+        first, _, last = (part.strip() for part in block.values["KNAME"].text.upper().partition(":"))
         if last:
             begin, stop = (self._to_label(self._at, "GOTO", label) for label in (first, last))
         else:
@@ -223,11 +224,13 @@ class SiemensRun(ParametricRun):
         """M17, RET, the end of a program: the line after the call, or the end of the run."""
         while self._levels and self._levels[-1].stop >= 0:
             self._levels.pop()
+        if self._levels and self._levels[-1].kept and not bring_back(self.state, self._levels[-1].kept):
+            raise self._fail(row, "SAVE brings back frames that the subprogram changed", "TRANS before its end")
         return self._leave(row) if self._levels else len(self.lines)
 
     def _to_label(self, row: int, way: str, label: str) -> int:
         """The line of a label: forward (GOTOF), backward (GOTOB), backward first (REPEAT), or forward first (GOTO)."""
-        first = self._program_of(row)
+        first = max((begin for begin in self._ends if begin <= row), default=0)
         stop = min((end for end in self._ends if end > first), default=len(self.lines))
         rows = [place for place in self._labels.get(label, []) if first <= place < stop]
         ahead, behind = [place for place in rows if place > row], [place for place in rows[::-1] if place <= row]
@@ -238,9 +241,6 @@ class SiemensRun(ParametricRun):
         while self._levels and self._levels[-1].stop >= 0 and not self._levels[-1].first <= to < self._levels[-1].stop:
             self._levels.pop()
         return to
-
-    def _program_of(self, row: int) -> int:
-        return max((begin for begin in self._ends if begin <= row), default=0)
 
     def _jump_to(self, row: int, steering: Steering) -> int | None:
         way, label = steering.label.split()
@@ -313,12 +313,15 @@ class SiemensRun(ParametricRun):
             name = PATH.sub("", str(scanner.result()).upper())
         first = self._sub(name, row, steering.column) + 1
         level = Subprogram(name, first, row + 1, 0)
-        level.arguments, level.references = self._bound(row, first - 1, scanner)
+        heads = (PROGRAM.match(code_text(line)) for line in self.lines[first - 1 : first + 19])
+        proc = next((head[3] for head in heads if head is not None and head[2]), "")
+        level.arguments, level.references = self._bound(row, proc, scanner)
         times = self._times(scanner)
         scanner.refuse_if(not scanner.done, f"{scanner.rest()} behind the call of {name}", "a block of its own")
         level.again = times - 1
         if times:
             self._begin(level, row, steering.column)
+            level.kept = modes_of(self.state) if re.search(r"\bSAVE\b", proc) else {}
         return first if times else None
 
     def _sub(self, name: str, row: int, column: int) -> int:
@@ -334,11 +337,10 @@ class SiemensRun(ParametricRun):
         return self._subs[name]
 
     def _bound(
-        self, row: int, first: int, scanner: SiemensScanner
+        self, row: int, proc: str, scanner: SiemensScanner
     ) -> tuple[dict[str, float | None], dict[str, tuple[Values, str]]]:
         """PROC's parameters with the values of a call; those by reference (VAR), with the variables that they name."""
-        heads = (PROGRAM.match(code_text(line)) for line in self.lines[first : first + 20])
-        parameters = PARAMETER.findall(next((head[3] for head in heads if head is not None and head[2]), ""))
+        parameters = PARAMETER.findall(proc)
         named = {place for place, (by, *_) in enumerate(parameters) if by}
         values = scanner.arguments(named) if scanner.sign("") and scanner.begins("(") else []
         bound, references = dict[str, float | None](), dict[str, tuple[Values, str]]()

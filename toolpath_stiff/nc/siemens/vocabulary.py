@@ -44,6 +44,11 @@ def entry(state: State, block: CurrentBlock, code: str) -> None:
     block.refuse_if(state.cutter is not None and state.plain.entry, code, "while G41 or G42 is on", "NORM and G450")
 
 
+def feed_place(state: State, block: CurrentBlock, code: str) -> None:
+    """CFC, CFIN, CFTCP: F holds on a compensated contour's arcs, on inside ones, or for the tool's centre."""
+    state.plain.feed_place = code
+
+
 def dwell(state: State, block: CurrentBlock, code: str) -> None:
     """G4 F: a pause in seconds; G4 S: in revolutions of the spindle."""
     seconds, turns = (time_word(state, block, letter) for letter in "FS")
@@ -99,6 +104,9 @@ _ROWS: Rows = (
     ("path control", f"{BASICS}, Tool radius compensation", (
         ("NORM KONT G450 G451", entry, "how a compensated contour begins, and its outside corners"),
     )),
+    ("path control", f"{BASICS}, Feedrate optimization for curved path sections", (
+        ("CFC CFIN CFTCP", feed_place, "where F holds beside arcs"),
+    )),
     ("T", f"{BASICS}, Tool change", (("T", tools.select, "tool"),)),
     ("M tool change", f"{BASICS}, Tool change", (("M6", tools.change, "tool change"),)),
     ("tool length", f"{BASICS}, Tool offsets", (("D", tools.edge, "cutting edge: length and radius"),)),
@@ -123,9 +131,9 @@ _ROWS: Rows = (
         ("HOLES1 HOLES2 CYCLE801 CYCLE802", cycles.pattern, "holes on a line, on a circle, in a grid, at points"),
     )),
     ("corner", f"{CYCLES}, Milling cycles", (
-        ("POCKET3 POCKET4", milling.mill_pocket, "rectangular pocket, circular pocket"),
-        ("CYCLE76 CYCLE77", milling.mill_spigot, "rectangular spigot, circular spigot"),
-        ("CYCLE71 CYCLE61", milling.mill_face, "face"), ("CYCLE72", contours.mill_contour, "contour"),
+        ("POCKET3 POCKET4", milling.mill_area, "rectangular pocket, circular pocket"),
+        ("CYCLE76 CYCLE77", milling.mill_area, "rectangular spigot, circular spigot"),
+        ("CYCLE71 CYCLE61", milling.mill_area, "face"), ("CYCLE72", contours.mill_contour, "contour"),
     )),
     ("corner", f"{MANUAL}, Operating, Blank input", (("WORKPIECE", tools.blank, "blank"),)),
 )  # fmt: skip
@@ -135,7 +143,7 @@ LISTED = {
         "how the control plans ahead: the path is taken as programmed":
             "G9 G60 G64 G601 G602 G603 G641 G642 G643 G644 G645 G62 G621 BRISK BRISKA SOFT SOFTA DRIVE FFWON FFWOF "
             "COMPON COMPCURV COMPCAD COMPSURF COMPOF CYCLE832 DYNNORM DYNPOS DYNROUGH DYNSEMIFIN DYNFINISH DYNPREC "
-            "FIFOCTRL STARTFIFO STOPFIFO RTLION RTLIOF UPATH SPATH FNORM FLIN FCUB CFC CFIN CFTCP CUT2D "
+            "FIFOCTRL STARTFIFO STOPFIFO RTLION RTLIOF UPATH SPATH FNORM FLIN FCUB CUT2D "
             "CPRECON CPRECOF FGROUP ORISON ORISOF ORIWKS ORIMKS ORIRESET CDON CDOF CDOF2 G460 G461 G462 OST OSOF G290 "
             "HIGH_SPEED ORIVECT ORIPLANE ORIAXES",
         "message, stop of the look-ahead, display":
@@ -150,7 +158,7 @@ LISTED = {
 }  # fmt: skip
 WORDS = frozenset((
     "ADIS", "ADISPOS", "SPOS", "SPOSA", "OVR", "OVRRAP", "FGREF", "CTOL", "OTOL", "ACC", "H", "FRC", "FL", "LIMS",
-    "ATOL", "DISC", "VELOLIM", "ACCLIM", "JERKLIM", "FA", "STOLF", "FB",
+    "ATOL", "VELOLIM", "ACCLIM", "JERKLIM", "FA", "STOLF", "FB",
 ))  # fmt: skip
 _BY_MOVES = "post the moves of the cycle"
 REFUSED = refused((
@@ -173,6 +181,7 @@ REFUSED = refused((
     ("G140 G141 G142 G143 G147 G148 G247 G248 G340 G341 G347 G348", "smooth approach and retraction",
      "post its moves", f"{BASICS}, Smooth approach and retraction"),
     ("G291", "the ISO dialect", "read it as G code: --dialect fanuc", f"{MANUAL}, ISO Milling"),
+    ("DISC", "corners between an arc and an intersection", "DISC=0", f"{BASICS}, Tool radius compensation"),
     ("RNDM", "rounding of all corners", "RND= at each of them", f"{BASICS}, Chamfer, rounding"),
     ("A2 B2 C2 A4 B4 C4 A5 B5 C5 LEAD TILT THETA OFFN OEMIPO1", "an orientation given otherwise", "A3, B3, C3",
      f"{PLANNING}, Orientation"),
