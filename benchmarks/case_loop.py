@@ -17,8 +17,6 @@ from benchmarks.bars import Figure, Record, bars_table, summary
 from benchmarks.pages import write_page
 from toolpath_stiff.rig.case import BUILT
 
-HERE = Path(__file__).parent
-
 
 def run_benchmark(
     parser: argparse.ArgumentParser,
@@ -27,27 +25,28 @@ def run_benchmark(
     diagnosed: Callable[[Any, Path], Record],
     report: Callable[[Sequence[Record], str], tuple[str, bool]],
 ) -> int:
-    """The exit code of a benchmark on blind cases, 1 if a bar is not cleared; its page is printed and written.
+    """The exit code of a benchmark on blind cases, 1 if a bar is not cleared; prints its page, writes it to --out.
 
     `make_jobs` makes the cases that the options say, `diagnosed` is that of `record_of`, `report` the page of all
     records and of the command, and whether all bars are cleared.
     """
     name = parser.prog.rpartition(".")[2]
-    records, page = HERE.parent / "reports" / f"benchmark_{name}.jsonl", HERE / f"{name}.md"
+    records = Path(__file__).parent.parent / "reports" / f"benchmark_{name}.jsonl"
     if "--built" not in parser.format_usage():
         parser.add_argument("--built", choices=BUILT, default=BUILT[0], help=f"machines (default: {BUILT[0]})")
     parser.add_argument("--jobs", type=int, default=2, help="processes (default: 2)")
     parser.add_argument("--records", type=Path, default=records, help="JSON lines, one a case")
     parser.add_argument("--resume", action="store_true", help="keep the cases that --records holds")
     parser.add_argument("--table-only", action="store_true", help="print the tables from --records again")
-    parser.add_argument("--out", type=Path, default=page, help="markdown file to write")
+    parser.add_argument("--out", type=Path, metavar="FILE.md", help="write the page to this file as well")
     args = parser.parse_args(arguments)
     if not args.table_only:
         run_cases(make_jobs(args), diagnosed, args.jobs, args.records, resume=args.resume)
     made = [json.loads(line) for line in args.records.read_text(encoding="utf-8").splitlines()]
     text, cleared = report(made, f"{parser.prog} {shlex.join(sys.argv[1:] if arguments is None else arguments)}")
     print(text)
-    write_page(args.out, text, of_records=args.table_only)
+    if args.out:
+        write_page(args.out, text, of_records=args.table_only)
     return 0 if cleared else 1
 
 

@@ -119,7 +119,7 @@ def test_a_program_that_cannot_be_read_is_one_of_the_failures(shop, capsys):
         (["jobs", "--jobs", "two"], "expected at least 1"),
         (["jobs", "--machine", "none"], "neither a packaged machine nor a file"),
         (["jobs", "--compare", "none"], "neither a packaged machine nor a file"),
-        (["jobs", "--effects", "none.py"], "does not exist"),
+        (["jobs", "--effects", "none.py"], "no effects file"),
         (["jobs", "--controller", "none.toml"], "none.toml"),
         (["jobs", "--tools", "none.tbl"], "none.tbl"),
         (["jobs", "--out", "jobs/bad.nc/out"], "cannot write"),

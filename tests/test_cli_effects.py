@@ -93,7 +93,7 @@ def test_new_never_overwrites(template, capsys):
     ("words", "message"),
     [
         (["show", "platform_flexibilty"], "Did you mean platform_flexibility"),
-        (["list", "--effects", "none.py"], "'none.py' does not exist"),
+        (["list", "--effects", "none.py"], "no effects file 'none.py'"),
         (["new", "my screw.py"], "such as my_screw.py"),
         (["new", "screw.txt"], "such as my_screw.py"),
     ],

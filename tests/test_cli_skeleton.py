@@ -177,7 +177,7 @@ def test_interruption_is_130(part, monkeypatch, capsys, while_loading):
 
 
 UNFORESEEN = [
-    (ValueError("a\nbug"), r"an error that should not be \(ValueError, test_cli_skeleton.py:\d+\): a bug"),
+    (ValueError("a\nbug"), r"unexpected error \(ValueError, test_cli_skeleton.py:\d+\): a bug"),
     (np.linalg.LinAlgError("Singular matrix"), r"\(LinAlgError, .*: Singular matrix"),
     (MemoryError("Unable to allocate 9. GiB"), r"Unable to allocate 9. GiB"),
     (OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "full/part.csv"), "No space left on device: 'full/part.csv'"),

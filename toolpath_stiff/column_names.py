@@ -14,7 +14,7 @@ Mapped = Annotated[
     Option(
         "--columns",
         "MAPPING",
-        help='Columns that files call otherwise: "stiffness=stiff_mean:N/um, date=day:DD.MM.YYYY, setup==bare" '
+        help='Columns with other names in the files: "stiffness=stiff_mean:N/um, date=day:DD.MM.YYYY, setup==bare" '
         "(default: as FILE.columns.toml beside a file says).",
     ),
 ]

@@ -93,6 +93,14 @@ def read_bytes(path: str | Path, what: str, most: int = LARGEST_BYTES) -> bytes:
     return content
 
 
+def read_utf8(path: str | Path, what: str, most: int = LARGEST_BYTES) -> str:
+    """Text of a file in UTF-8, without its byte-order mark. Raises `InputError`."""
+    try:
+        return read_bytes(path, what, most).decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(f"{what} is not a text file", file=str(path)) from None
+
+
 def check_regular(path: Path, pipes: bool = False) -> None:
     """Refuse files that may never end when read: a device, or a named pipe waiting for its writer.
 

@@ -140,7 +140,7 @@ def _table(rows: Rows, file: str, columns: Columns, separator: str, remarks: lis
     named = _mapped(columns)
     start = next((i for i, (_, row) in enumerate(rows) if named.keys() <= set(row)), 0)
     if start:
-        remarks.append(f"{start} lines above the heading are passed over")
+        remarks.append(f"{start} lines above the heading are skipped")
     (line, written), *body = rows[start:]
     while not written[-1]:
         written.pop()

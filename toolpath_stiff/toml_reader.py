@@ -13,7 +13,7 @@ from typing import Any, Self, TypeGuard
 
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.files import read_bytes
+from toolpath_stiff.files import read_utf8
 
 LARGEST_BYTES = 4_000_000
 HEADING = re.compile(r"""[ \t]*\[(\[?)([\w.'" \t-]+)\]""")
@@ -53,10 +53,7 @@ class TomlReader:
     @classmethod
     def read(cls, path: str | Path, what: str, kind: type[InputError] = InputError) -> Self:
         """Read a file, as the constructor. Raises `InputError` if it cannot be read, `kind` if it is not TOML."""
-        try:
-            return cls(read_bytes(path, what, LARGEST_BYTES).decode("utf-8-sig"), str(path), what, kind)
-        except UnicodeDecodeError:
-            raise kind(f"{what} is not a text file", file=str(path)) from None
+        return cls(read_utf8(path, what, LARGEST_BYTES), str(path), what, kind)
 
     def line_of(self, section: str, key: str = "", nth: int = 0) -> int | None:
         """Line of a key in a section (the nth of that name), or of the section's heading; None if not found."""

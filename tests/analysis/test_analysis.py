@@ -104,7 +104,7 @@ def test_rotary_move_takes_the_softest_direction_and_no_weight():
     analysis = analyse_text("F1000\nG1 X10\nG1 A5\nG1 X20\n")
     alone = analysis.samples.line == 3
     assert analysis.at.substituted[alone].all() and not analysis.counted[alone].any()
-    assert any("softest direction stands in" in warning for warning in analysis.warnings)
+    assert any("softest direction is used instead" in warning for warning in analysis.warnings)
     report = evaluate_poses(MODEL, analysis.samples.position[alone], analysis.samples.abc[alone])
     np.testing.assert_allclose(analysis.at.stiffness[alone], report.softest_stiffness, rtol=1e-12)
 

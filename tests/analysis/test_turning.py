@@ -128,7 +128,7 @@ def test_a_program_round_the_base_is_evaluated_as_its_joints_have_to_go(tmp_path
     program = tps.Program.from_text(ROUND, name="round.nc")
     found = tps.analyze(program, DATA / "robot200.toml", origin_mm_deg=(0, 0, 0), step_mm=20, turn="best")
     assert found.complete and found.to_dict()["configuration"].startswith("shoulder ")
-    told = next(words for words in found.warnings if "the configuration has to change" in words)
+    told = next(words for words in found.warnings if "in this configuration; it has to change" in words)
     cutting = found.samples.cutting[1:] & found.samples.cutting[:-1]
     jumps = np.flatnonzero((np.abs(np.diff(found.at.joints, axis=0)).max(axis=1) > 0.35) & cutting)
     assert len(jumps) and {f"{found.samples.line[row + 1]}" for row in jumps} <= set(re.findall(r"\d+", told))
@@ -145,8 +145,8 @@ def test_lines_that_ask_more_than_a_joints_speed_are_told(tmp_path):
     program = tps.Program.from_text(cuts, name="cuts.nc")
     here = {"origin_mm_deg": (0, 0, 0), "step_mm": 2}
     found = tps.analyze(program, slow, **here)
-    told = [words for words in found.warnings if "more of a joint than its speed" in words]
-    assert len(told) == 1 and told[0].startswith("lines 4 ask") and " of 40: feed slower there" in told[0]
+    told = [words for words in found.warnings if "need a joint to exceed its speed" in words]
+    assert len(told) == 1 and told[0].startswith("lines 4 need") and " of 40; reduce the feed there" in told[0]
     rows = found.to_frame()
     line = rows[rows.line == 4]
     rates = [(line[f"joint_J{i}_deg"].diff().abs() / line["t_s"].diff()).max() for i in range(1, 7)]
@@ -179,7 +179,7 @@ def test_a_placement_is_chosen_with_the_tools_turn(tmp_path):
 
 def test_a_machine_without_a_free_turn_refuses():
     mill = build_model(load_machine(DATA / "mill5.toml"))
-    with pytest.raises(InputError, match="no turn about the tool's axis to spare"):
+    with pytest.raises(InputError, match="no free rotation about the tool's axis"):
         choose_turn(mill, *path(5), SOFTEST, "best")
     with pytest.raises(InputError, match="reaches no pose"):
         position, *rest = path(5)

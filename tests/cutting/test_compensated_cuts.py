@@ -207,7 +207,7 @@ def test_the_wall_of_a_tilted_tool_is_left_alone_and_the_other_is_shifted():
     )
     assert tilted in compensated.rewritten.text and compensated.changed
     reasons = dict(zip(compensated.lines["line"], compensated.lines["left_alone"], strict=True))
-    assert reasons.pop(14).endswith("a tool aslant") and not any(reasons.values())
+    assert reasons.pop(14).endswith("a tilted tool") and not any(reasons.values())
 
 
 BOSS = (

@@ -184,7 +184,7 @@ def test_what_is_removed_is_what_is_missing(points, corner):
 
 
 def test_a_tool_that_nobody_described_is_refused_with_its_line():
-    with pytest.raises(ProgramError, match="tool 3 cuts and its geometry is not known") as error:
+    with pytest.raises(ProgramError, match="tool 3 cuts but its geometry is not known") as error:
         Milling(HEAD + "T3 M6\nG1 X10\nM30\n")
     assert error.value.line == 3
 

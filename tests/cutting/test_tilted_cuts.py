@@ -199,12 +199,12 @@ def test_lines_on_which_the_tool_turns_or_stands_aslant_are_left_alone_by_name(t
     )
     compared = tps.compare_walls(tmp_path / "points.csv", program=program, cut=tmp_path / "cut.toml")
     assert [row["line"] for row in compared.lines] == [5]
-    assert any(note.startswith("lines 9: the tool turns on its way: no error") for note in compared.notes)
-    assert "lines 13: left alone: the tool stands aslant" in compared.notes
+    assert any(note.startswith("lines 9: the tool turns along the move: no error") for note in compared.notes)
+    assert "lines 13: not compared: the tool is tilted" in compared.notes
     compensated = tps.compensate(program, cut=tmp_path / "cut.toml")
     left = dict(zip(compensated.lines["line"], compensated.lines["left_alone"], strict=True))
-    assert left[5] == "" and left[13].endswith("a tool aslant") and 9 not in left
-    assert "lines 9: left alone: the tool turns on its way" in compensated.notes
+    assert left[5] == "" and left[13].endswith("a tilted tool") and 9 not in left
+    assert "lines 9: not shifted: the tool turns along the move" in compensated.notes
 
 
 def posed(place, rotary):

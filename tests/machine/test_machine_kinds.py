@@ -97,26 +97,26 @@ def test_trunnions_are_linuxcncs(hal, letter, folder):
     np.testing.assert_allclose(turned, machine.rotation_of(np.deg2rad(there[:, 3:])), atol=1e-12)
 
 
-HEAD = """
-name = "head"
-kind = "serial"
-[tool]
-tip_mm = [0.0, 0.0, -250.0]
-[[element]]
+SPINDLE = """[[element]]
 name = "spindle"
 type = "spring"
 at = "tip"
 translation_nm_per_N = [9.0, 9.0, 3.5]
 rotation_nrad_per_Nm = [0.0, 0.0, 0.0]
-""" + "".join(
-    f'[[axis]]\nname = "{name}"\ntype = "{kind}"\naxis = {axis}\nxyz_mm = {place}\n'
-    f"min_{unit} = -inf\nmax_{unit} = inf\n"
-    for name, kind, axis, place, unit in (
-        ("X", "linear", [1, 0, 0], [0, 0, 0], "mm"),
-        ("Y", "linear", [0, 1, 0], [0, 0, 0], "mm"),
-        ("Z", "linear", [0, 0, 1], [0, 0, 0], "mm"),
-        ("C", "rotary", [0, 0, 1], [0, 0, 250], "deg"),
-        ("B", "rotary", [0, -1, 0], [0, 0, 0], "deg"),
+"""
+HEAD = (
+    'name = "head"\nkind = "serial"\n[tool]\ntip_mm = [0.0, 0.0, -250.0]\n'
+    + SPINDLE
+    + "".join(
+        f'[[axis]]\nname = "{name}"\ntype = "{kind}"\naxis = {axis}\nxyz_mm = {place}\n'
+        f"min_{unit} = -inf\nmax_{unit} = inf\n"
+        for name, kind, axis, place, unit in (
+            ("X", "linear", [1, 0, 0], [0, 0, 0], "mm"),
+            ("Y", "linear", [0, 1, 0], [0, 0, 0], "mm"),
+            ("Z", "linear", [0, 0, 1], [0, 0, 0], "mm"),
+            ("C", "rotary", [0, 0, 1], [0, 0, 250], "deg"),
+            ("B", "rotary", [0, -1, 0], [0, 0, 0], "deg"),
+        )
     )
 )
 

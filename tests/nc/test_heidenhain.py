@@ -162,7 +162,7 @@ REFUSALS = {
     "FC R10 CCX+10 CCY+0 CCA90": ("without its direction", 3),
     "FLT LEN5": ("without a contour element before it", 3),
     "FL AN+90 LEN5 PDX+3": ("no word of FL", 3),
-    "FL PR+5": ("both of them, behind FPOL", 3),
+    "FL PR+5": ("not determined", 3),
     "L X-9\nAPPR LT X+0 Y+9 LEN5 RL\nCT X+5 Y+9": ("without a contour element in the plane", 5),
     "CYCL DEF 254 SLOT": ("cycle that is not supported", 3),
     "CYCL DEF 251 POCKET": ("without Q200", 3),
@@ -171,17 +171,23 @@ REFUSALS = {
     f"{BORE.format(335, 40)} Q342=20 Q370=1\nM99": ("several helices", 4),
     f"TOOL CALL 9 Z\n{BORE.format(335, 40)}\nM99": ("radius of tool 9.*--tools", 5),
     f"L M4\n{BORE.format(335, 15)}\nM99": ("under M4", 5),
+    f"CYCL DEF 8.1 X\n{POCKET.format(252, 'Q223=40')}\nM99": ("under M4 or cycle 8", 5),
+    f"{POCKET.format(252, 'Q223=40 Q439=3')}\nM99": ("feeds of the cutting edge", 4),
+    f"{POCKET.format(257, 'Q223=40 Q222=50').replace('Q368=0', 'Q368=1')}\nM99": ("finishes a stud", 4),
     f"{BORE.format(335, 15)}\n9 Q201 = -9\nM99": ("Q201 was set again", 5),
     f"{POCKET.format(251, 'Q218=9 Q219=40')}\nM99": ("narrower than its tool", 4),
     f"{POCKET.format(251, 'Q218=40 Q219=40 Q367=5')}\nM99": ("no position", 4),
     f"{POCKET.format(253, 'Q218=20 Q219=40')}\nM99": ("shorter than the slot is wide", 4),
     f"{POCKET.format(252, 'Q223=40 Q370=-1')}\nM99": ("no overlap", 4),
-    f"{POCKET.format(252, 'Q223=40').replace('Q202=4', 'Q202=0.0001')}\nM99": ("too many infeeds", 4),
+    f"{POCKET.format(252, 'Q223=40').replace('Q202=4', 'Q202=0.0001')}\nM99": ("too many rounds", 4),
     f"{POCKET.format(252, 'Q223=40').replace('Q207=300', 'Q207=MAX')}\nM99": ("mills at FMAX", 4),
     "Q5 = 1\nTCH PROBE 0.0 PLANE Q5 X-\nTCH PROBE 0.1 X+5\nL X+Q5": ("Q5 is read before it is set", 6),
     "TCH PROBE 412 X ~\n Q320=5\nL X+1": ("place is not known", 5),
     "PATTERN DEF POS1": ("form that is not known", 3),
     "PATTERN DEF FRAME1 (X+0 Y+0 DX+8 DY+8 NUMX4 NUMY4)": ("form that is not known", 3),
+    "PATTERN DEF ROW1 (X+0 Y+0 NUM2)": ("ROW with other words", 3),
+    "PATTERN DEF POS1 (X+0 Y+0 FOO)": ("POS with other words", 3),
+    "PATTERN DEF POS1 (X+0 Y+0 D+5)": ("POS with other words", 3),
     "PATTERN DEF ROW1 (X+0 Y+0 D+8 NUM2.5)": ("2.5 for a number of points", 3),
     "PATTERN DEF POS1 (X+0 Y+0)\nCYCL CALL PAT": ("without a cycle to call", 4),
     'SEL PATTERN "A.PNT"': ("of other files", 3),
@@ -310,6 +316,7 @@ def test_walls_and_floors_of_milled_forms_are_those_of_the_cycle(cycle, seed):
     }
     low = 0.0 if stud else low
     body = POCKET.format(cycle, own.get(cycle, "")).replace("Q368=0", f"Q368={spare}").replace("Q369=0", f"Q369={low}")
+    body = body.replace("Q215=0 ", "" if stud else "Q215=0 ")
     if cycle in (252, 257):
         length = width
     if cycle in (252, 253, 257):

@@ -182,7 +182,7 @@ def test_a_controller_file(tmp_path):
     assert read_program(program, controller=read_controller(path, "linuxcnc")).dialect.startswith("linuxcnc, changed")
     with pytest.raises(InputError, match="without --write"):
         rewrite_program(read, (0.0,) * 6, (0.0,) * 6)
-    with pytest.raises(InputError, match="its own dialect alone"):
+    with pytest.raises(InputError, match="its own dialect only"):
         read_program(program, controller=read_controller(path), interpreter="linuxcnc")
 
 

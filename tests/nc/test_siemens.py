@@ -103,6 +103,7 @@ REFUSALS = {
     "$P_UIFR[1]=CTRANS(X,2):CROT(Z,9)": "more than a shift: CROT",
     "$P_UIFR[1,X,FI]=2": "no shift of an axis",
     "G1 X2\n$P_UIFR[1]=CTRANS(X,2)": "writes the offset in force",
+    "$P_UIFR[R1]=CTRANS(X,2)": "without its number",
     "$P_UIFR[0]=CTRANS(X,2)": "no settable offset",
     "G1 X1 DISC=50": "DISC is corners between an arc",
     "UP1\nM30\n%_N_UP1_SPF\nPROC UP1 SAVE\nTRANS X5\nM17": "SAVE brings back frames",
@@ -193,7 +194,7 @@ def test_every_word_has_its_source_and_meaning_and_stands_in_a_program():
     own = [name for name, row in TABLE.items() if row.controls == ("siemens",) and not row.listed]
     unproved = {name for name in own if not re.search(rf"(?<![A-Z]){name[0]}0*{name[1:]}(?!\d\d)", bodies)}
     siblings = {"G53", "G153", "KONT", "G450", "G451", "NORM", "ASCALE", "AMIRROR", "CSPLINE", "WORKPIECE",
-                 "G74", "M17", "$P_UIFR"}  # fmt: skip
+                 "G74", "M17", "$P_UIFR", "CFC"}  # fmt: skip
     assert {name for name in unproved if not re.fullmatch(r"G5[0-9]{1,2}", name)} <= siblings
 
 

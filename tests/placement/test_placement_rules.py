@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import toolpath_stiff as tps
+from tests.machine.test_machine_kinds import SPINDLE
 from tests.placement.test_placement_search import MODEL, TANGENTIAL, headline_figures, program_of
 from toolpath_stiff.analysis.results import analyze
 from toolpath_stiff.cli.main import main
@@ -81,18 +82,12 @@ kind = "serial"
 X_mm = [-400.0, 400.0]
 Y_mm = [-220.0, 220.0]
 Z_mm = [0.0, 450.0]
-[[element]]
-name = "spindle"
-type = "spring"
-at = "tip"
-translation_nm_per_N = [9.0, 9.0, 3.5]
-rotation_nrad_per_Nm = [0.0, 0.0, 0.0]
 """
 
 
 def test_nothing_gets_worse_on_a_machine_that_is_as_stiff_everywhere(tmp_path):
     """Its range is 0 but for rounding, which no placement makes better or worse."""
-    (tmp_path / "alike.toml").write_text(STIFF_ALIKE)
+    (tmp_path / "alike.toml").write_text(STIFF_ALIKE + SPINDLE)
     slot = tps.Program.from_text("G21 G90\nG0 X0 Y0 Z5\nG1 Z0 F300\nG1 X41 Y3\nG1 Y30\nM2\n", name="slot.nc")
     placed = tps.place(slot, tmp_path / "alike.toml", x_mm=(-90, 70), z_mm=(100, 300), rotate_deg=(0, 40), step_mm=4)
     assert placed.worse == []

@@ -187,7 +187,7 @@ def test_forces_that_do_not_settle_are_an_error_that_names_effect_and_pose():
         ],
     )
     position, _ = random_poses(4, 2)
-    with pytest.raises(InputError, match=r"do not settle at X.* under 400 N with slack"):
+    with pytest.raises(InputError, match=r"do not converge at X.* under 400 N with slack"):
         core.compliance_along(model, np.tile(unit([1, 2, 3]), (4, 1)), position, force=400.0)
 
 

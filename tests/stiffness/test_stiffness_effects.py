@@ -191,7 +191,7 @@ def test_an_error_in_a_file_given_by_a_relative_name_has_its_line(user_file, tmp
 
 
 def test_a_file_that_does_not_exist_or_is_no_python(tmp_path):
-    with pytest.raises(InputError, match="does not exist"):
+    with pytest.raises(InputError, match="no effects file"):
         effects_from_file(tmp_path / "none.py")
     (tmp_path / "text.txt").write_text("hello")
     with pytest.raises(InputError, match=r"ends in \.py"):

@@ -160,7 +160,7 @@ def test_large_bodies_are_refused_before_they_are_read(running):
 @pytest.mark.parametrize(
     ("asked", "said"),
     [
-        ({"do": "format"}, "nothing called"),
+        ({"do": "format"}, "unknown action"),
         ({"do": "aside", "file": "../x.csv", "line": 3}, ""),
         ({"do": "switch", "effect": "ghost", "values": {}}, ""),
         ({"do": "claim", "effects": "weak_strut"}, "sealed"),

@@ -219,7 +219,6 @@ def test_no_strut_loses_more_than_four_fifths_of_its_compliance(some_path):
         ('shape = "slope"', 'shape = "bend"', "shape", "expected one of slope, square"),
         ("start_mm", "start_m", "constants", "expected of slope: start_mm, end_mm or power, reference_mm"),
         ("-110.0", '"left"', "constants", "a number within"),
-        ("-110.0", "170.0", "constants", "slope of no width"),
         ("bounds_nm_per_N = [0.0, 500.0]", "bounds_nm_per_N = [9.0, 500.0]", "[[effect]]", "neutral"),
         ("bounds_nm_per_N", "bounds_um_per_N", "bounds_um_per_N", "is not known"),
         ('size = "table_y"', 'size = "table y"', "[[effect]]", "letters, digits and underscores"),

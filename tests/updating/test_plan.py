@@ -123,7 +123,7 @@ def test_a_difference_that_refitting_closes_is_no_gap():
     pair = [Rival("one", covariance=loose), Rival("two", (0.1, 0.1), covariance=loose)]
     found = plan_measurements(nist(), pair, 1e-9, 6, menu=menu(), strut_spread=0.0)
     assert found.pairs[0].separation_sigma <= np.hypot(0.1, 0.1) / (np.sqrt(2.0) * 0.2) * 1.01
-    assert any("nobody measures better" in note for note in found.notes)
+    assert any("no measurement is better" in note for note in found.notes)
     known = [replace(r, covariance=None) for r in pair]
     assert plan_measurements(nist(), known, 0.02, 6, menu=menu()).pairs[0].separation_sigma > 3.0
 

@@ -31,8 +31,8 @@ def joint_warnings(path: EvaluatedPath, changes: IntArray | Sequence[int] = ()) 
     jumps = np.union1d(back, np.asarray(changes, dtype=np.int64))
     if len(jumps):
         warnings.append(
-            f"{lines_named(samples.line[jumps])}: the joints cannot go on as they stand; the configuration has to "
-            "change there, or a joint to turn back"
+            f"{lines_named(samples.line[jumps])}: the joints cannot continue in this configuration; it has to "
+            "change there, or a joint has to turn back"
         )
     duration = np.diff(samples.t)
     counted = np.setdiff1d(np.flatnonzero(going & (duration > SHORTEST)), jumps - 1)
@@ -44,7 +44,7 @@ def joint_warnings(path: EvaluatedPath, changes: IntArray | Sequence[int] = ()) 
         asked, most = (shop(float(value)) for value in (speed[row, joint], machine.joint_speeds[joint]))
         line = samples.line[counted + 1]
         warnings.append(
-            f"{lines_named(line[(share > 1.0).any(axis=1)])} ask more of a joint than its speed, most line "
-            f"{line[row]}: {machine.joint_names[joint]} {asked:.3g} {unit} of {most:.3g}: feed slower there"
+            f"{lines_named(line[(share > 1.0).any(axis=1)])} need a joint to exceed its speed, most of all line "
+            f"{line[row]}: {machine.joint_names[joint]} {asked:.3g} {unit} of {most:.3g}; reduce the feed there"
         )
     return warnings

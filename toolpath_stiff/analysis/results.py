@@ -268,7 +268,7 @@ def _effective_origin(machine: MachineTool, program: ReadProgram, origin: Pose |
         chosen = machine.default_origin
     if program.moves.from_machine.any() and not np.allclose(chosen, program.origin, rtol=0.0, atol=1e-12):
         raise ProgramError(
-            "moves in machine coordinates (G53, G28, G30) depend on where program zero sits",
+            "moves in machine coordinates (G53, G28, G30) depend on the position of program zero",
             hint=f"read the program with origin={tuple(round(v, 9) for v in chosen)}",
             file=program.name,
         )
@@ -289,7 +289,7 @@ def _warnings(analysis: Analysis) -> list[str]:
     if swapped.any():
         warnings.append(
             f"{lines_named(samples.line[swapped])}: the load direction does not exist there "
-            "(rotary axes alone, or a move along the tool axis); the softest direction stands in"
+            "(rotary axes alone, or a move along the tool axis); the softest direction is used instead"
         )
     return warnings
 

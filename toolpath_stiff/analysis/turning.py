@@ -108,7 +108,7 @@ def check_free_turn(machine: MachineTool, mode: str | float) -> None:
     if isinstance(mode, str) and mode not in (FIXED, FEED, BEST):
         raise InputError(f"--turn {mode}", expected=f"{FIXED}, {FEED}, {BEST}, or degrees")
     if len(machine.joint_names) < 6 or machine.joint_kinds.count("rotary") < 3:
-        raise InputError(f"--turn {mode}: machine {machine.name} has no turn about the tool's axis to spare")
+        raise InputError(f"--turn {mode}: machine {machine.name} has no free rotation about the tool's axis")
 
 
 def choose_turn(

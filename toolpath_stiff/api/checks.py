@@ -30,7 +30,7 @@ def check(
     origin_mm_deg
         Where program zero sits.
     step_mm
-        Largest distance of the samples at which the machine is asked.
+        Largest distance between the samples at which reach is checked.
 
     Raises
     ------

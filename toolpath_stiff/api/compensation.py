@@ -44,11 +44,11 @@ def compensate(
     program, machine
         The program, and the machine that runs it.
     cut, material, stock_mm
-        As of `analyze`.
+        The cut, as in `analyze`.
     origin_mm_deg
-        Where program zero (G54) sits, as of `analyze`.
+        Where program zero (G54) sits, as in `analyze`.
     step_mm
-        Largest distance of two samples.
+        Largest distance between two samples.
     decimals
         Decimals of the numbers written; unless given, 4 in mm, 5 in inch.
     progress
@@ -113,21 +113,25 @@ def compare_walls(
     data
         Points of a coordinate measuring machine: x_mm,y_mm,z_mm in program coordinates, nx,ny,nz out of the part, and
         deviation_um along that, + material left, unless the points themselves have it.
-    machine, program
-        The machine that cut the part, and the program that it ran.
+    machine
+        The machine that cut the part.
+    program
+        The program that cut the part.
     cut, material, stock_mm
-        As of `analyze`.
+        The cut, as in `analyze`.
     columns
         Columns that the file names differently: "deviation=dev:mm", or such a dict.
-    origin_mm_deg, step_mm
-        Where program zero sat; largest distance of two samples.
+    origin_mm_deg
+        Where program zero sat.
+    step_mm
+        Largest distance between two samples.
     progress
         Called with what is being done.
 
     Raises
     ------
     InputError
-        The file cannot be read, nothing is known of the cut, or no point lies on a final wall.
+        The file cannot be read, no cut is given, or no point lies on a final wall.
 
     Examples
     --------
@@ -159,5 +163,5 @@ def compare_walls(
 
 def _known(setup: CutSetup | None) -> CutSetup:
     if setup is None:
-        raise InputError("nothing is known of the cut", hint="say --cut FILE, or --material and --stock")
+        raise InputError("no cut is given", hint="say --cut FILE, or --material and --stock")
     return setup

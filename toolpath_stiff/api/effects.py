@@ -28,7 +28,7 @@ def effects(
     files
         Files with effects of one's own.
     kind
-        Kind of machine that they apply to.
+        Kind of machine that the effects apply to.
 
     Raises
     ------

@@ -37,7 +37,7 @@ def forces(
         Columns that the files name differently: "fx=Kraft X:kN, feed_per_tooth==0.05", or such a dict; unless given, as
         FILE.columns.toml beside a file says.
     axes
-        Axes of the dynamometer that point along the feed, to its left and up; what it reads acts on the work.
+        Axes of the dynamometer that point along the feed, to its left and up; its readings are forces on the work.
     tool
         Number of the tool (default: the only one in the setup file).
     material

@@ -90,7 +90,7 @@ def machine_from_urdf(
     file
         The URDF file.
     tip
-        The link whose frame is that of the tool's tip, z to the shank; a flange, where the tool is added by hand.
+        The link at the tip of the tool, with z towards the shank; or a flange, if you add the tool by hand.
 
     Raises
     ------
@@ -121,7 +121,7 @@ def machine_from_dh(
         Columns alpha_deg, a_mm, d_mm, offset_deg, min_deg, max_deg and, if there, name and type (R, or P with min_mm,
         max_mm).
     convention
-        Convention of the rows, which they do not show: modified (Craig) or standard.
+        Convention of the rows: modified (Craig) or standard; the rows do not show it.
 
     Raises
     ------
@@ -151,7 +151,7 @@ def machine_from_freecad(
     file
         The machine.
     order
-        Axes from the base outwards, where the file does not say which carries which.
+        Axes from the base outwards, if the file does not give their order.
 
     Raises
     ------

@@ -46,7 +46,7 @@ class Machine(Result):
     asked
         The name or file that it was loaded by.
     effect_files
-        Python files with effects of one's own.
+        Python files with your own effects.
     setup, temperature_C
         As `load` was told; None: as the controller file or the machine file says.
     allow_unchecked_effects
@@ -94,13 +94,13 @@ class Machine(Result):
         machine
             Name or file.
         effects
-            File with physical effects of one's own, which the machine file may name.
+            File with your own physical effects, which the machine file may use.
         setup
-            The set-up that is on the machine, for effects that belong to one; "none": none that has a name.
+            The set-up on the machine, for effects that belong to a set-up; "none": one without a name.
         temperature_C
             Degrees Celsius, for effects that need it.
         allow_unchecked_effects
-            Compute even with effects of one's own that fail `tps effects check`; every result says so.
+            Use your own effects even if they fail `tps effects check`; every result says so.
 
         Raises
         ------
@@ -133,8 +133,8 @@ class Machine(Result):
         Parameters
         ----------
         setup
-            Set-up that is on the machine, for effects that belong to one; none: a set-up without a name. Unless given,
-            the controller file's, else the machine file's.
+            Set-up on the machine, for effects that belong to a set-up; none: one without a name. Unless given, that of
+            the controller file, otherwise of the machine file.
         temperature_C
             Degrees Celsius, for effects that need it; unless given, the machine file's.
 

@@ -83,25 +83,25 @@ def place(
     x_mm, y_mm, z_mm
         Position of program zero, mm: low and high, or a number to fix it; unless given, as far as the machine reaches.
     z_values_mm
-        The only heights that there are, mm.
+        Heights to choose from, mm, instead of a range.
     base_mm
-        Position of the work's table from the machine's base: bounds and heights that are given count from there.
+        Position of the work's table relative to the machine's base; bounds and heights are measured from there.
     rotate_deg, tilt_a_deg, tilt_b_deg
-        Turn and tilts of the set-up, degrees: low and high, or a number to fix it.
+        Rotation of the set-up about Z and tilts about X and Y, degrees: low and high, or a number to fix it.
     turn
-        How a robot turns the tool about its axis: fixed as programmed, by so many degrees, or best, a constant turn
-        that the search chooses with the placement.
+        How a robot rotates the tool about its axis: fixed as programmed, by a number of degrees, or best, a constant
+        rotation that the search chooses with the placement.
     keep_out
         Boxes that the tool tip stays out of, rapids included, machine coordinates, mm.
     margin_percent
-        Share of each limit's span that cuts and rapids keep from it.
+        Distance that cuts and rapids keep from each limit, as a share of its span.
     allow_extrapolation
-        Let struts leave the lengths of their law at more samples than now.
+        Allow struts to leave the length range of their law at more samples than now.
     objective
-        Balanced is mean - range, error (with `cut`) the error that 95 % of the final walls stay below; whatever it is,
-        none of mean, range and weakest gets worse where that can be avoided.
+        What to optimise: balanced is mean - range, error (with `cut`) the error that 95 % of the final walls stay
+        below. In any case mean, range and weakest place get no worse where that can be avoided.
     points
-        Most points of the front.
+        Maximum number of points on the front.
     seed
         Random seed of the search.
     origin_mm_deg
@@ -110,17 +110,18 @@ def place(
     load
         Direction of the load: tangential, axial, normal, softest, radial, x, y, z or "DX,DY,DZ".
     step_mm
-        Largest distance of two samples.
+        Largest distance between two samples.
     force_N
         Size of the load: for deflections, and for effects that depend on it.
     cut, material, stock_mm
-        For the objective error, as of `analyze`.
+        The cut, as in `analyze`, for the objective error.
     write
-        The program itself, transformed so that, run at the present origin, it cuts at the placement: name of its file.
+        File for the transformed program, which cuts at the placement when it is run at the present origin.
     decimals
-        Decimals of its numbers; unless given, 4 in mm and degrees, 5 in inch.
+        Decimals of the numbers written; unless given, 4 in mm and degrees, 5 in inch.
     linearise_mm
-        Write arcs that the turn takes out of the planes as straight moves within so much; unless given, refuse them.
+        Write arcs that the rotation takes out of the planes as straight moves within this tolerance; unless given,
+        refuse them.
     progress
         Called with what is being done, how much of it is done, how much there is.
 
@@ -198,7 +199,7 @@ def _bounds(
     workspace = mm_from_m(working_box(machine)).T.tolist()
     for axis, side, reach in zip("xyz", sides, workspace, strict=True):
         if side is None and not np.isfinite(reach).all():
-            raise InputError(f"the machine file bounds no workspace in {axis}", hint=f"give --{axis} LO:HI")
+            raise InputError(f"the machine file has no workspace limits in {axis}", hint=f"give --{axis} LO:HI")
     lengths = np.array([_pair(reach if side is None else side) for side, reach in zip(sides, workspace, strict=True)])
     angles = np.array([_pair(turn) for turn in (*turns, *_turn_of_tool(machine, tool))])
     if not np.abs(lengths).max() <= inputs.FARTHEST_MM or not np.abs(angles).max() <= FARTHEST_TURN_DEG:

@@ -146,9 +146,10 @@ def map_stiffness(
     machine
         A machine, its name or its file.
     x_mm, y_mm
-        (low, high) of the planes; unless given, 150 mm to either side of the default origin, of hexapods of the axis.
+        Extent of the planes (low, high); unless given, 150 mm to either side of the default origin, for hexapods of the
+        axis.
     z_mm
-        Height, or heights; unless given, that of the default origin, of hexapods 1200.
+        Height, or heights; unless given, that of the default origin, for hexapods 1200 mm.
     load
         Direction of the load: radial, axial, softest, x, y, z or "DX,DY,DZ".
     tilt_deg

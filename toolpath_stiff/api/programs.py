@@ -57,26 +57,26 @@ def analyze(
     load
         Direction of the load: tangential, axial, normal, softest, radial, x, y, z or "DX,DY,DZ".
     step_mm
-        Largest distance of two samples.
+        Largest distance between two samples.
     force_N
         Size of the load: for deflections, and for effects that depend on it.
     partial
         Keep the reachable samples of a program that leaves the workspace (exit code 1).
     turn
-        How a robot turns the tool about its axis: fixed as programmed, by so many degrees, with the feed, or best: the
-        stiffest within the limits of the joints, constant unless a changing turn gains or is needed.
+        How a robot rotates the tool about its axis: fixed as programmed, by a number of degrees, with the feed, or
+        best: the stiffest within the limits of the joints, constant unless a changing rotation is stiffer or needed.
     require_N_per_mm
-        Stiffness that every cutting move must have; those below are listed (exit code 3).
+        Required stiffness of every cutting move; those below are listed (exit code 3).
     compare_with
         Another machine to analyze the program on.
     cut
         Setup file of the cut (`tps cut new` writes one): stock, tools, coefficients. It gives engagement, cutting
         forces and the error of the surface.
     material, stock_mm
-        In place of a setup file a packaged material, and the box of the stock, X, Y, Z in mm (or "extents"); the tool
-        table has the tools.
+        Instead of a setup file: a packaged material (--material) and the box of the stock (--stock, X,Y,Z in mm, or
+        "extents"), with the tools of the tool table.
     tolerance_um
-        Error that the surface may have; lines that leave it are listed (exit code 3).
+        Allowed error of the surface; lines that exceed it are listed (exit code 3).
     progress
         Called with what is being done, samples done, samples in all.
 
@@ -152,7 +152,7 @@ def sample_path(program: Program | str | Path, *, origin_mm_deg: Origin = None, 
     origin_mm_deg
         Where program zero sits; unless given, where the program's G10 says, else 0.
     step_mm
-        Largest distance of two samples; every move has samples at both of its ends.
+        Largest distance between two samples; every move has samples at both ends.
 
     Raises
     ------

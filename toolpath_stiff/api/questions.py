@@ -47,7 +47,7 @@ NoisePercent = Annotated[Noise, Option("--noise", "PERCENT[,PERCENT]", read=numb
 StrutSpread = Annotated[
     float, Option("--strut-spread", "%", at_least=0, at_most=50, help="Standard deviation of the struts' stiffness.")
 ]
-Seed = Annotated[int, Option("--seed", at_least=0, help="Of every random draw.")]
+Seed = Annotated[int, Option("--seed", at_least=0, help="Seed of all random draws.")]
 COMMON = ("columns", "noise_percent", "strut_spread_percent")  # options that `Asked.command` writes
 
 
@@ -206,8 +206,10 @@ def diagnose(
         As of `compare`.
     noise_percent, strut_spread_percent, seed
         As of `compare`.
-    program, origin_mm_deg
-        Where several explanations remain, how much the choice matters is worked out on this program, placed there.
+    program
+        If several explanations remain, how much the choice matters is computed on this program.
+    origin_mm_deg
+        Where zero of this program (G54) sits.
     progress
         Called with what is being done.
 
@@ -230,7 +232,7 @@ def diagnose(
     question = Question(machine, data, noise_percent, strut_spread_percent, seed, columns)
     if not isinstance(question.model, Hexapod):
         if program is not None:
-            raise InputError("--program, on which explanations are weighed, knows hexapods only", hint="leave it out")
+            raise InputError("--program, which compares explanations, is for hexapods only", hint="leave it out")
         return question.of_elements()
     on, part, origin = question.on, None if program is None else program_from(program), origin_si(origin_mm_deg)
     words = [
@@ -277,18 +279,19 @@ def update(
     strut_law
         Write the refitted strut law even without an effect, if the data support it.
     keep_strut_law
-        Keep the strut law as given; else it is refitted along with every effect, and written if the data support it.
+        Keep the strut law as given; otherwise it is refitted with every effect, and written if the data support it.
     joints
-        Of a machine of elements: refit the torsions of all joints that turn, in place of the file's.
+        On a machine of elements: refit the torsions of all rotary joints instead of the file's.
     auto
         Add effects as long as the error at left-out points falls and the data support it.
     force
-        Write what the data do not support as well, never what fits worse than the machine given; and as
-        --replace.
+        Write effects even if the data do not support them, but never a machine that fits worse than the given one;
+        includes --replace.
     believe
-        Machine or instrument: the one to hold responsible for an error that either could cause; else it is refused.
+        Which to hold responsible for an error that either could cause, machine or instrument; unless given, it is
+        refused.
     objective
-        Mean-error: the strut law alone, as the paper fitted it.
+        What to optimise; mean-error fits the strut law alone, as the paper did.
     machine_file
         Name that the new machine file is to have, for the record.
     columns
@@ -318,7 +321,7 @@ def update(
     }  # fmt: skip
     if isinstance(question.model, Hexapod):
         if joints:
-            raise InputError("--joints is of machines of elements", hint="a hexapod's struts: --strut-law")
+            raise InputError("--joints is for machines of elements", hint="a hexapod's struts: --strut-law")
         result = update_machine(UpdateTask(question.model, question.readings, strut_law=strut_law, **options))
     else:
         if strut_law or keep_strut_law or objective == MEAN_ERROR:
@@ -408,8 +411,8 @@ def plan(
     data, machine
         The machine; measurements, or the files that hold them; None before the first campaign.
     between
-        Effects to tell apart, on elements "joint_torsion:joint 2", or "none"; unless given, what a diagnosis of the
-        data leaves standing.
+        Effects to tell apart, or "none"; on elements as "joint_torsion:joint 2". Unless given, those that a diagnosis
+        of the data leaves open.
     n
         Number of poses; unless given, 6, or 24 in a first campaign.
     radius_mm
@@ -421,11 +424,12 @@ def plan(
     loads_N
         Loads; unless given, 500, 1000, 4000 and those of the data.
     tool_extensions_mm
-        Extensions of tools beyond the reference tool; the first is in the spindle. Unless given, as last, and 150.
+        Tool lengths beyond the reference tool; the first is in the spindle now. Unless given, the last one measured,
+        and 150 mm.
     setups
         Set-ups, the first now on the table; unless given, those of the data.
     indicators
-        Take a second indicator across a link of the load path where that tells more.
+        Use a second indicator across a link of the load path where it tells more.
     minutes
         Cost of work: of a "reading" (1), a "pose" (15), another "tool" (10), another "setup" (45), a second
         "indicator" (10).

@@ -263,7 +263,7 @@ class Case:
 
     def _check_effect(self, name: str) -> None:
         if name not in self.state.effects:
-            raise InputError(f"{name} is no file of own effects of this case", expected=", ".join(self.state.effects))
+            raise InputError(f"{name} is not an effect file of this case", expected=", ".join(self.state.effects))
 
     def add_effects(self, file: str | Path, instead_of: str = "") -> None:
         """Use a Python file with the user's own effects. Its code is run: to add it is to agree to that.
@@ -556,7 +556,7 @@ def _place(case: Case, result: str, progress: Progress | None, **bounds: Any) ->
 def _set_up(case: Case, result: str, progress: Progress | None) -> Found:
     state = case.state
     if len(state.origin) < 3:
-        raise InputError("the program sits where it always did", hint="put it somewhere with place_at first")
+        raise InputError("the program is still at its initial placement", hint="put it somewhere with place_at first")
     place: Document = dict(zip(PLACE, (*state.origin, 0.0, 0.0, 0.0), strict=False))
     (on, machine), name, written = _switched(case, result), Path(state.program).name, {}
     try:

@@ -149,7 +149,7 @@ def _made_by(function: Callable[..., TextFile]) -> Callable[..., int]:
         made = run.call(args, function)
         run.tell("note", made.notes)
         if out:
-            return run.write_text(args, out, made.text, "next", "machine", "check", out)
+            return run.write_text(args, out, made.text, "fill in what it leaves open, then", "machine", "check", out)
         sys.stdout.write(made.text)
         return 0
 

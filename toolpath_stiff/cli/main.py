@@ -58,8 +58,6 @@ examples:
 `tps COMMAND --help` describes a command. Lengths are in mm, angles in degrees, stiffnesses in N/mm.
 """
 
-INTERRUPTED = "tps: interrupted; no file is half-written\n"
-
 
 def help_text() -> str:
     """Help text of `tps` itself."""
@@ -105,11 +103,9 @@ def main(argv: Sequence[str] | None = None) -> int:
             return _ended("", code)
         except TpsError as error:
             return _ended(f"tps: error: {error}\n", error.exit_code)
-        except KeyboardInterrupt:
-            return _ended(INTERRUPTED, 130)
-        except Exception as error:
-            if isinstance(error.__cause__, KeyboardInterrupt):  # it came while a library was loaded
-                return _ended(INTERRUPTED, 130)
+        except (KeyboardInterrupt, Exception) as error:
+            if KeyboardInterrupt in (type(error), type(error.__cause__)):  # or it came while a library was loaded
+                return _ended("tps: interrupted; no file is half-written\n", 130)
             return _ended(f"tps: error: {last_resort(error)}\n", 2)
 
 
@@ -117,9 +113,8 @@ def _run(words: list[str]) -> int:
     """Run the command that the words name."""
     name = next((word for word in words if not word.startswith("-")), "")
     if not name:
-        strange = [word for word in words if word not in ("-h", "--help", "--version")]
-        if strange:
-            raise InputError(f"tps does not know {strange[0]!r}", hint="see tps --help")
+        if strange := {*words} - {"-h", "--help", "--version"}:
+            raise InputError(f"tps does not know {min(strange)!r}", hint="see tps --help")
         print(f"tps {VERSION}" if "--version" in words else help_text())
         return 0 if words else 2
     title, actions = name, actions_of(name)
@@ -166,7 +161,7 @@ def last_resort(error: Exception) -> str:
     frames = traceback.extract_tb(error.__traceback__)
     place = f", {Path(frames[-1].filename).name}:{frames[-1].lineno}" if frames else ""
     words = " ".join(str(error).split()) or "no more is known"
-    return f"an error that should not be ({type(error).__name__}{place}): {words}; report this line"
+    return f"unexpected error ({type(error).__name__}{place}): {words}; please report this line"
 
 
 def entry() -> None:

@@ -44,7 +44,7 @@ def reduce(
     raw
         Raw records: files, FILE.xlsx[#SHEET].
     compression_positive
-        Forces of struts on a bench count compression positive.
+        Forces of struts on a bench are positive in compression.
     out
         File to write (default: <first RAW>_measurements.csv); loops go beside it.
     """

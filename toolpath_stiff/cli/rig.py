@@ -44,16 +44,17 @@ def new(
     Parameters
     ----------
     seed
-        Of every random draw, 0 or more.
+        Seed of all random draws, 0 or more.
     out
         Folder to write to.
     layout
-        Paper: its 14 points along X, Y, Z; tilted: 24 tilted poses, two loads, two repeats; campaign: the rows of --at.
+        paper: the 14 points of the paper along X, Y, Z; tilted: 24 tilted poses, two loads, two repeats; campaign: the
+        rows of --at.
     at
         Poses of layout campaign: measurement file without stiffness.
     hidden
-        None, one, two, three, outside, unknown, or NAME[,NAME]; default: drawn blindly from the seed, unknowns left
-        out.
+        What to hide: none, one, two, three, outside, unknown, or NAME[,NAME]; default: drawn blindly from the seed,
+        without unknowns.
     noise
         Repeat noise of a reading.
     machine
@@ -92,7 +93,7 @@ def measure(
     out
         File to write.
     visit
-        Another number draws clamping and noise anew.
+        Number of the visit; another one draws clamping and noise again.
     """
     text, count = measured_again(folder, at, visit)
     run.write_single(args, {Path(out): text}, *(Path(folder) / name for name in FILES))

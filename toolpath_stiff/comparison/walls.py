@@ -141,7 +141,7 @@ def compare_walls(
     upright = (cut.samples.abc[:, :2] == 0.0).all(axis=1)
     station, side = np.nonzero(np.isfinite(cut.wall_mean) & upright[:, None])
     aslant = np.isfinite(cut.wall_mean).any(axis=1) & ~upright
-    notes = (*notes, *cut.lines_warning(aslant, "left alone: the tool stands aslant"))
+    notes = (*notes, *cut.lines_warning(aslant, "not compared: the tool is tilted"))
     samples, radius = cut.samples.take(station), of_tools(cut.cutters, cut.samples.tool[station], "radius")
     surface, into = walls_beside(cut.samples, cut.cutters, station, side)
     height = samples.position[:, 2, None] + cut.wall_heights[station, side] + np.array([-FARTHEST, FARTHEST])

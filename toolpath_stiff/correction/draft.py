@@ -101,7 +101,7 @@ def draft(diagnosis: Diagnosis, file: str) -> EffectDraft:
     commands = {
         "read it, change it, then try it": command_line("effects", "check", file),
         "let it compete with the catalogue": request.command("diagnose", effects=[file]),
-        "measure where it would show, or fail": request.command("plan", effects=[file]),
+        "measure where it would be confirmed or refuted": request.command("plan", effects=[file]),
     }
     marks = sorted(set(reading_marks(diagnosis.data).tolist()))
     text = draft_text(name, portrait, source, f"Drawn by `{drawn}` from {source}.", list(commands.values()), marks)

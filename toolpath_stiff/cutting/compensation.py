@@ -35,8 +35,8 @@ MOST_TURNS, SWINGING = 6, 0.9
 SHORT = 3e-3  # m of a move, below which it is a part of a wall
 SAME = 1e-7  # m by which the error of a wall may grow: rounding of the numbers written, and of the stock's grid
 WORSE = "it would be worse"
-ELSEWHERE = "lines beside it make its wall afterwards"
-BETWEEN = "it lies between two walls: what a shift takes off one it adds to the other"
+ELSEWHERE = "other lines cut its wall afterwards"
+BETWEEN = "it lies between two walls: what a shift removes from one it adds to the other"
 
 
 @dataclass(frozen=True)
@@ -280,7 +280,7 @@ def compensate_program(
     if not len(before.row):
         raise ProgramError("no pass makes a wall of the finished part", file=program.name)
     still = np.unique(before.row[~movable_rows(moves)[before.row]]).tolist()
-    alone = dict.fromkeys(still, "a plunge, an arc on edge, or a tool aslant")
+    alone = dict.fromkeys(still, "a plunge, a vertical arc, or a tilted tool")
     alone |= _too_far(before)
     fixed = shift_program(program, origin, {}, decimals=decimals, control=control)[2]
     alone |= {
@@ -375,7 +375,7 @@ def _lines(
 
 
 def _notes(change: float, cut: Cut, rewritten: RewrittenProgram) -> tuple[str, ...]:
-    notes = [*rewritten.notes, *cut.lines_warning(cut.turning, "left alone: the tool turns on its way")]
+    notes = [*rewritten.notes, *cut.lines_warning(cut.turning, "not shifted: the tool turns along the move")]
     if change > SETTLED:
-        notes.append(f"the iteration did not settle: the last turn still changed shifts by {um_from_m(change):.2f} um")
+        notes.append(f"the iteration did not converge: its last step changed shifts by {um_from_m(change):.2f} um")
     return (*notes, "floors are not compensated")

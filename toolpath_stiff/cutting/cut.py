@@ -155,7 +155,7 @@ def evaluate_cut(
         Something is missing (which, and where to write it), the tool turns in every cut, or joints leave a choice.
     """
     if len(model.machine.configurations) > 1:
-        mistake = f"a cut on machine {model.machine.name}, whose joints stand in several ways"
+        mistake = f"a cut on machine {model.machine.name}, which reaches poses in several configurations"
         raise InputError(mistake, expected="`tps analyze --cut`, which keeps one, or a machine of one configuration")
     orient = model.machine.angles_of if program.native else np.asarray
     cutters, samples = cutters_of(setup, program), sample_moves(program.moves, step, angles_of=orient)
@@ -321,10 +321,10 @@ def _assumptions(cut: Cut, model: StiffnessModel, setup: CutSetup) -> tuple[str,
     ]
     sentences += [sentence for cutter in cut.cutters.values() for sentence in cutter.origin]
     sentences += [
-        "errors of the surface are quasi-static deflections of tip and tool: no vibration, no wear, no heat; the chip "
-        "is not thinner for them",
-        "a spring pass meets the part as programmed, not what the pass before left by its error: where it takes "
-        "nothing off, its error counts as 0",
+        "errors of the surface are quasi-static deflections of tip and tool: no vibration, no wear, no heat; they "
+        "do not reduce the chip thickness",
+        "a spring pass is computed on the part as programmed, without the error of the pass before: where it removes "
+        "nothing, its error is 0",
     ]
     if model.load_dependent:
         sentences.append("effects that depend on the load act as under the mean force of a turn")
@@ -340,7 +340,7 @@ def _warnings(cut: Cut, struck: BoolArray) -> tuple[str, ...]:
     if cut.machine_only:
         numbers = [f"T{number}" for number, cutter in cut.cutters.items() if np.isnan(cutter.lateral_compliance)]
         warnings.append(
-            f"machine only: the compliance of {', '.join(numbers)} is not known, and a slim tool gives way more than "
+            f"machine only: the compliance of {', '.join(numbers)} is not known, and a slim tool is softer than "
             "the machine (stick_out_mm in [[tool]] of cut.toml)"
         )
     engaged = cut.ap > 0.0
@@ -351,11 +351,11 @@ def _warnings(cut: Cut, struck: BoolArray) -> tuple[str, ...]:
     on_the_spot = cut.turning & ~samples.tangent.any(axis=1)
     large = (np.abs(np.nan_to_num(cut.wall_mean)).max(axis=1) > THIN * cut.ae) & (cut.ae > 0.0)
     for rows, words in (
-        (large, f"walls off by over {THIN:g} of the width of cut, predicted too large: the chip is not thinner for it"),
+        (large, f"walls off by over {THIN:g} of the width of cut, predicted too large: the chip stays as thick"),
         (struck, "rapids run into material, which counts as still there afterwards"),
-        (plunges, "plunges: cutting with the end is not modelled, no force is known there"),
-        (cut.turning & ~on_the_spot, "the tool turns on its way: no error of the surface is predicted there"),
-        (on_the_spot, "the tool turns on the spot: it takes off what it meets, no force is known there"),
+        (plunges, "plunges: cutting with the end of the tool is not modelled, the force there is unknown"),
+        (cut.turning & ~on_the_spot, "the tool turns along the move: no error of the surface is predicted there"),
+        (on_the_spot, "the tool turns on the spot: it removes what it meets, the force there is unknown"),
     ):  # fmt: skip
         warnings += cut.lines_warning(rows, words)
     chip = np.where(engaged, cut.feed_per_tooth, np.nan)

@@ -63,7 +63,7 @@ def least_squares(response: FloatArray, force: FloatArray) -> tuple[FloatArray, 
     for _ in range(2):  # the first fit gives the scatter of each direction, the second is weighted by it
         rows = (design / size / deviation[:, None]).reshape(-1, determined.sum())
         solved, _, rank, _ = np.linalg.lstsq(rows, (measured / deviation).ravel(), rcond=1e-12)
-        if rank < determined.sum() or freedom < 1:
+        if rank < determined.sum() or freedom < 1 or not measured.any():
             raise MeasurementError(
                 "these slots do not tell the coefficients apart",
                 expected="slots at 3 different feeds or more, forces along x, y and, of a corner radius, z",

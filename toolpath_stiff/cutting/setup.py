@@ -217,7 +217,7 @@ def spindle_of(setup: CutSetup, program: ReadProgram, samples: Samples) -> Float
     if without.any():
         row = int(np.argmax(without))
         surface = bool(np.isnan(speed[row]))
-        problem = "a constant surface speed (G96) says no speed of the spindle" if surface else "the spindle stands"
+        problem = "a constant surface speed (G96) does not give a spindle speed" if surface else "the spindle stands"
         hint = "program G97 S" if surface else "program S and M3, or write [spindle] speed_per_min in cut.toml"
         raise ProgramError(f"a cut while {problem}", hint=hint, file=program.name, line=int(samples.line[row]))
     return speed

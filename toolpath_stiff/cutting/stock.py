@@ -94,7 +94,7 @@ def stock_of_extents(moves: Moves, cutters: Mapping[int, Cutter]) -> Stock:
     cuts = moves.take((moves.motion != RAPID) & (np.hypot(*(moves.end - moves.start)[:, :2].T) > 0.0))
     ends = extents(cuts)
     if not ends or max(0.0, ends["z"][1]) <= ends["z"][0]:
-        raise InputError("no move cuts sideways below z = 0: the extents tell no stock", hint="give the stock's box")
+        raise InputError("no move cuts sideways below z = 0: they do not give a stock", hint="give the stock's box")
     radius = max(cutters[tool].radius for tool in np.unique(cuts.tool).tolist())
     low = tuple(m_from_mm(ends[axis][0]) - (radius if axis != "z" else 0.0) for axis in "xyz")
     high = tuple(m_from_mm(ends[axis][1]) + radius for axis in "xy")

@@ -104,7 +104,7 @@ def _ends_of(moves: Moves, cutters: Mapping[int, Cutter], cuts: BoolArray) -> tu
     """(n,) and (n,) m, radius of the cutter and of its flat end, for moves that cut (n,); raises `ProgramError`."""
     unknown = np.flatnonzero(cuts & ~np.isin(moves.tool, list(cutters)))
     if len(unknown):
-        mistake = f"tool {moves.tool[unknown[0]]} cuts and its geometry is not known"
+        mistake = f"tool {moves.tool[unknown[0]]} cuts but its geometry is not known"
         hint = "give it a [[tool]] in the file of --cut"
         raise ProgramError(mistake, hint=hint, line=int(moves.line[unknown[0]]))
     radius, flat = (np.where(cuts, of_tools(cutters, moves.tool, name), 0.0) for name in ("radius", "flat"))

@@ -254,7 +254,7 @@ def next_steps(diagnosis: Diagnosis, request: Asked | None = None) -> list[str]:
         names = diagnosis.explanations[0].split(" + ")
         update = request.command("update", *options(add=names), "-o", request.updated_machine)
         if verdict == "described":
-            measure = unplanned or hint("measure where it would show, or fail", plan)
+            measure = unplanned or hint("measure where it would be confirmed or refuted", plan)
             return [measure, hint("add it all the same, as described", update)]
         if bounded := diagnosis.fits[diagnosis.explanations[0]].at_upper_bound():  # an update would refuse it
             return [hint(f"{joined(bounded)} ends at its bound: measure more before adding it", plan)]

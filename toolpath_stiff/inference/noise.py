@@ -199,7 +199,7 @@ def _noise_of_tip(
     ) -> Noise:
         every = np.maximum(np.full(len(data), repeat), LEAST)
         if np.min(repeat) < LEAST:
-            origin += f"; at least {100 * LEAST:g} % a reading is counted: nobody measures better"
+            origin += f"; at least {100 * LEAST:g} % a reading is counted: no measurement is better"
         wild = OUTLIERS if repeats is None else repeats.wild
         mean = float(np.sqrt(np.mean(np.square(clamping))))
         each = clamping if isinstance(clamping, np.ndarray) else None

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from toolpath_stiff import defaults
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.files import read_bytes
+from toolpath_stiff.files import read_utf8
 from toolpath_stiff.hints import command_line
 from toolpath_stiff.machine.limits import upright_middle
 from toolpath_stiff.machine.model import Hexapod, MachineTool
@@ -70,12 +70,7 @@ def load_machine(name_or_file: str | Path = defaults.MACHINE) -> MachineTool:
             expected=f"one of {', '.join(known)}, or a machine file",
             hint=f"`tps machine list` lists the machines, `{template}` writes a commented template",
         )
-    try:
-        text = read_bytes(path, "machine file", LARGEST_BYTES).decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        mistake = f"not a text file (byte {error.start})"
-        raise InputError(mistake, expected="a machine file (TOML, UTF-8)", file=str(path)) from None
-    return parse_machine(text, file=str(path))
+    return parse_machine(read_utf8(path, "the machine file", LARGEST_BYTES), file=str(path))
 
 
 @cache

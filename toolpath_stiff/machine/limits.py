@@ -134,7 +134,7 @@ class Reach:
             return "no limit"
         limit = self.limits[int(self.limit[i])]
         if limit.quantity == JOINTS:
-            return "no joint values lead there" if self.margin[i] < 0.0 else "no limit"
+            return "no joint values reach it" if self.margin[i] < 0.0 else "no limit"
         value, bound = _shown(limit, float(self.value[i])), _shown(limit, limit.bound)
         if self.margin[i] >= 0.0:
             return f"{limit.name} at {value}, limit {bound}"

@@ -449,7 +449,7 @@ def as_hexapod(machine: MachineTool, asking: str) -> Hexapod:
     """The machine as a hexapod. Raises `InputError` for another kind; `asking` begins the sentence."""
     if isinstance(machine, Hexapod):
         return machine
-    mistake = f"{asking} knows machines of six struts only: {machine.name} is of kind {machine.kind}"
+    mistake = f"{asking} works for machines with six struts only: {machine.name} is of kind {machine.kind}"
     raise InputError(mistake, expected="a hexapod")
 
 

@@ -88,7 +88,7 @@ def read(toml: MachineToml) -> Serial:
     tool, work, tip, table = _of_rows(toml, rows, values, convention)
     parts = read_elements(toml, (tool, work), (tip, table))
     if not any(parts.bodies):
-        raise InputError("no [[element]]: nothing gives way", expected="springs, joints or beams", file=toml.file)
+        raise InputError("no [[element]]: nothing is compliant", expected="springs, joints or beams", file=toml.file)
     known = [body.element.name + TORSION for side in parts.bodies for body in side if turns(body.element)]
     common = common_fields(toml, values, known)
     machine = Serial(

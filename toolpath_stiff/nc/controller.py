@@ -182,7 +182,7 @@ class Controller:
         """Raise `InputError` if LinuxCNC's interpreter would read a program differently from the control."""
         if not self.plain:
             other = f"this control's is {self.dialect.name!r}, or it has single block-delete switches"
-            problem = f"LinuxCNC's interpreter knows its own dialect alone, and {other}"
+            problem = f"LinuxCNC's interpreter knows its own dialect only, and {other}"
             raise ProgramError(problem, hint="use the built-in interpreter (--interpreter builtin)")
 
     @property

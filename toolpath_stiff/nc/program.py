@@ -73,12 +73,12 @@ class Program:
         file
             NC program or cutter-location file.
         dialect
-            The control, for what controls read differently: X10 without a decimal point, the time of G4 P, G70 and G71,
-            `;`. Unless given, as the controller file says, else generic. Heidenhain's and Siemens' languages are
-            recognised anyway.
+            The control, where controls differ: X10 without a decimal point, the time of G4 P, G70 and G71, `;`. Unless
+            given, that of the controller file, otherwise generic. Heidenhain's and Siemens' languages are recognised in
+            any case.
         controller
-            File of what belongs to the control (TOML: dialect, block_delete, offsets, tools, the kinematics that the
-            program was posted for; or LinuxCNC's .var or .tbl).
+            Settings of the control (TOML: dialect, block_delete, offsets, tools, the kinematics that the program was
+            posted for; or LinuxCNC's .var or .tbl).
         offsets
             Work offsets G54 to G59.3, instead of the controller file's.
         tools
@@ -86,7 +86,8 @@ class Program:
         block_delete
             Leave out blocks that begin with a slash, or those of the switches that are on, 1 to 9 (/ is /1).
         interpreter
-            What reads the program: the built-in reader, by default; LinuxCNC's rs274; auto: rs274 where that refuses.
+            What reads the program: builtin, the default; LinuxCNC's rs274; auto: rs274 where the built-in reader
+            refuses.
         rs274
             LinuxCNC's interpreter, if it is not on PATH.
         feed_mm_per_min
@@ -94,7 +95,7 @@ class Program:
         subprograms
             Folder of the files that the program calls (`o<name> call`, `M98 P1234`); without it none is opened.
         unconfined
-            Run rs274 even where bubblewrap, which keeps it from all files but its own, cannot be used.
+            Run rs274 even if bubblewrap, which keeps it from all other files, cannot be used.
 
         Raises
         ------

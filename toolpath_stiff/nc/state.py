@@ -202,8 +202,9 @@ class Conversational:
         Siemens' programmable frame without its shift: turn, mirror image, scale.
     renumbered
         Axes whose numbers changed while they stood, until they are named.
-    side, entry
-        G40, G41, G42 that waits for the next straight move; KONT or G451 in force, "" for NORM and G450.
+    side, entry, feed_place
+        G40, G41, G42 that waits for the next straight move; KONT or G451 in force, "" for NORM and G450; CFC (F holds
+        on arcs of contours), CFIN (on inside ones) or CFTCP in force, "": F is always the tool centre's.
     base
         G500 in force: "machine", or "zero" where the program takes no other offset; "": it is not.
     contour
@@ -218,7 +219,7 @@ class Conversational:
     corner: CurrentBlock | None = None
     approach: tuple[dict[int, float], Callable[[complex], None]] | None = None
     free: list[tuple[CurrentBlock, str, bool]] = field(default_factory=list)
-    closes: complex | None = None
+    closes: complex = complex(math.nan, math.nan)
     fast: bool = False
     to_corner: bool = False
     cycle: tuple[int, dict[str, float]] | None = None
@@ -245,6 +246,7 @@ class Conversational:
     renumbered: set[int] = field(default_factory=set)
     side: str = ""
     entry: str = ""
+    feed_place: str = ""
     base: str = ""
     contour: list[Element] = field(default_factory=list)
     offsets_named: bool = False

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from toolpath_stiff.errors import InputError, ProgramError
-from toolpath_stiff.files import read_bytes
+from toolpath_stiff.files import read_utf8
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.tables import Columns, parse_table
 from toolpath_stiff.toml_reader import TomlReader, is_number
@@ -89,11 +89,9 @@ class Offsets:
 
 def _text(path: str | Path, what: str) -> str:
     try:
-        text = read_bytes(path, what, LARGEST_BYTES).decode("utf-8-sig")
+        text = read_utf8(path, what, LARGEST_BYTES)
     except InputError as error:
-        raise ProgramError(error.found, hint=error.hint) from None
-    except UnicodeDecodeError:
-        raise ProgramError(f"{what} is not a text file", file=str(path)) from None
+        raise ProgramError(error.found, hint=error.hint, file=error.file) from None
     if not text.strip():
         raise ProgramError(f"the {what} is empty", file=str(path))
     return text

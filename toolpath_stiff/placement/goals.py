@@ -93,7 +93,7 @@ class SearchRules:
     seed
         Of the search; the same seed gives the same placements.
     points
-        Most points of the front.
+        Maximum number of points on the front.
     extrapolated
         Largest share of samples outside the strut law; inf: any. The search finds out.
     """

@@ -239,7 +239,7 @@ class Placement(FolderResult):
         if self.worse:
             warnings.append("no placement was found within the bounds that is as good as the present one in all three")
         if self.before is None:
-            nothing = "the present placement is out of reach, so nothing says what must not get worse"
+            nothing = "the present placement is out of reach, so nothing limits the recommendation"
             warnings.append(f"{nothing}: {self.present_reason}")
         else:
             warnings += self._rules_broken(self.before, "present")
@@ -281,7 +281,7 @@ class Placement(FolderResult):
         Raises `InputError` where it cannot be written there; the rest of the result stands.
         """
         if self.rewritten is None:
-            raise InputError(self.refusal or "the program was not written for the placement: ask with write=FILE")
+            raise InputError(self.refusal or "the program was not written for the placement: pass write=FILE")
         return self.rewritten
 
     @property

@@ -386,7 +386,7 @@ def _infeasible(search: Search, placement: FloatArray) -> UnreachableError:
         fault = f"takes a strut {mm_from_m(-float(room[row])):.3g} mm out of the lengths of its law"
     x, y, z, _, _, turned = pose_in_mm(placement[:6].tolist())
     return UnreachableError(
-        f"no placement is feasible: at the least bad one (X{x:.1f} Y{y:.1f} Z{z:.1f}, turned by {turned:.1f} degrees) "
+        f"no placement is feasible: at the closest one (X{x:.1f} Y{y:.1f} Z{z:.1f}, turned by {turned:.1f} degrees) "
         f"{'' if path.cutting[row] else 'the rapid of '}line {int(path.line[row])} {fault}",
         hint=hint,
     )

@@ -351,7 +351,7 @@ def plan_measurements(
     ranked, notes = _ranked(rivals)
     if repeat < LEAST:
         repeat = LEAST
-        notes.append(f"planned for a noise of {100 * LEAST:g} % a reading: nobody measures better")
+        notes.append(f"planned for a noise of {100 * LEAST:g} % a reading: no measurement is better")
     menu = menu or Menu()
     visits = possible_visits(machine, menu, matters(ranked), np.random.default_rng(seed))
     if menu.indicators and isinstance(machine, Hexapod):
@@ -359,14 +359,14 @@ def plan_measurements(
     forecasts, good, scatter = forecast_all(machine, ranked, visits.readings, effect_files, strut_spread)
     usable = np.logical_and.reduceat(good[visits.members], visits.starts)
     if not usable.any():
-        raise InputError("no pose that every rival has an answer to", hint="plan with fewer rivals, or other heights")
+        raise InputError("no pose that suits every rival", hint="plan with fewer rivals, or other heights")
     # Readings without a forecast belong to visits that are never chosen; their nan must not spread.
     forecasts = [
         replace(f, mean=np.where(good, f.mean, 0.0), factor=np.where(good[:, None], f.factor, 0.0)) for f in forecasts
     ]
     floors = {name: low for name, low in menu.floors.items() if name in visits.setup}
     words = ", ".join(f"{1e3 * low:.4g} mm" + (f" in set-up {name}" if name else "") for name, low in floors.items())
-    notes += [f"no pose lower than was measured before: {words}; name heights to go lower"] if floors else []
+    notes += [f"no pose lower than those measured before: {words}; name heights to go lower"] if floors else []
     noise = ReadingNoise(repeat, clamping, scatter)
     shares = {(f.name, g.name): pair_shares(visits, f, g, noise) for f, g in combinations(forecasts, 2)}
     picked = choose(visits, usable, shares, {f.name: f.weight for f in forecasts}, n)

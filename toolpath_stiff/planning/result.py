@@ -243,10 +243,10 @@ def plan(
             judgement = judgement or judge(problem, scatter, testable_effects(problem.predictor)[0], seed)
             rivals, verdict = rivals_of(judgement), judgement.verdict
             if verdict == "described":
-                notes.append("the answer is only described: the plan goes where it would show, or fail")
+                notes.append("the effect is only described: the plan measures where it would be confirmed or refuted")
             elif verdict != "ambiguous":
                 notes.append(
-                    f"the diagnosis is settled ({verdict}): the plan puts it to the test against what comes next"
+                    f"the diagnosis is settled ({verdict}): the plan tests it against the next best explanation"
                 )
         planned_for, errors = (scatter.typical_repeat, scatter.clamping), errors_so_far(problem, rivals)
     choice = plan_measurements(

@@ -81,7 +81,7 @@ def fitted_rivals(problem: Problem, names: Sequence[str], effects: Mapping[str, 
         family = score_family(problem, effects[name], base)
         if family is None or family.best is None:
             raise InputError(
-                f"fitted to these data, {name} comes out at nothing: it is no other explanation than {NONE}",
+                f"fitted to these data, the size of {name} is zero: it is no other explanation than {NONE}",
                 hint="plan without data (leave the files out) for the size that it usually has",
             )
         rivals.append(rival_of_fit(name, refine(problem, family.best)))
@@ -162,7 +162,7 @@ def rivals_on_elements(fits: Sequence[Fit], standing: Sequence[Fit], between: Se
     """
     by_name = {rival_name(fit): fit for fit in fits}
     if missing := [name for name in between if name not in by_name]:
-        mistake = f"--between {missing[0]}: fitted to these data it comes out at nothing"
+        mistake = f"--between {missing[0]}: fitted to these data its size is zero"
         raise InputError(mistake, expected=f"some of {', '.join(by_name)}")
     chosen = [by_name[name] for name in between] or [*standing, *(fit for fit in fits if fit not in standing)]
     chosen = chosen[: max(len(between) or len(standing), 2)]

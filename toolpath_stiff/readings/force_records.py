@@ -72,16 +72,13 @@ def read_records(
         for setting, column in (("spindle_rpm", rate), ("depth_mm", depth), (feed, fed)):
             odd = (column[rows] != column[rows[0]]) | (column[rows] <= 0.0)
             wrong[setting] = odd, f"above 0 and the same in all rows of a record, {column[rows[0]]:g}"
+        limit = f"at most {MOST_FORCE:g} N; is the unit right?"
+        wrong |= {axis: (np.abs(signal[rows, k]) > MOST_FORCE, limit) for k, axis in enumerate(FORCES, 1)}
         for setting, (odd, expected) in wrong.items():
-            if setting in (*needed, "time_s") and odd.any():
+            if setting in (*needed, "time_s", *FORCES) and odd.any():
                 row = int(rows[np.argmax(odd)])
                 mistake = f"{setting} = {table.record(table.rows[row][1]).get(setting, '')}"
                 raise MeasurementError(mistake, expected=expected, file=file, line=int(lines[row]))
-        largest = float(np.nanmax(np.abs(signal[rows, 1:])))
-        if not 0.0 < largest <= MOST_FORCE:
-            expected = f"more than 0 and at most {MOST_FORCE:g} N; is the unit right?"
-            mistake = f"forces up to {largest:g} N in a record"
-            raise MeasurementError(mistake, expected=expected, file=file, line=int(lines[rows[0]]))
         turns_a_second = float(rate[rows[0]]) / s_from_min(1.0)
         per_tooth = float(fed[rows[0]]) / (s_from_min(1.0) * turns_a_second * flutes if feed == FEEDS[1] else 1.0)
         settings = (m_from_mm(per_tooth), m_from_mm(float(depth[rows[0]])), turns_a_second)

@@ -17,7 +17,6 @@ import numpy as np
 from toolpath_stiff.arrays import FloatArray
 from toolpath_stiff.column_names import UNITS, Mapped, columns_option, heading_key, parted, same_quantity
 from toolpath_stiff.errors import MeasurementError
-from toolpath_stiff.files import is_file
 from toolpath_stiff.tables import Columns, Source, Table, read_table
 from toolpath_stiff.toml_reader import TomlReader
 from toolpath_stiff.workbooks import split_name
@@ -44,7 +43,7 @@ def mapped_table(path: str, what: str, columns: Columns, mapping: Mapped = None)
     beside = Path(split_name(path)[0] + BESIDE)
     remarks: tuple[str, ...] = ()
     sources: dict[str, Source] = {}
-    if is_file(beside):
+    if beside.is_file():
         sources = sources_of(TomlReader.read(beside, "a mapping of columns", MeasurementError).data, columns)
         remarks = (f"as {beside} says",)
     sources |= sources_of(mapping, columns) if mapping else {}

@@ -67,7 +67,7 @@ def _impossible(machine: MachineTool, stance: Struts | Stance) -> Iterator[str]:
     """For each pose the reason why the machine cannot be there at all, or ""."""
     if not isinstance(machine, Hexapod) or not isinstance(stance, Struts):
         for row in stance.joints:
-            yield "impossible: no joint values lead there" if np.isnan(row).any() else ""
+            yield "impossible: no joint values reach it" if np.isnan(row).any() else ""
         return
     stiffness = machine.strut_law.stiffness(stance.lengths)
     for index, of_struts in zip(singularity_index(machine, stance), stiffness, strict=True):

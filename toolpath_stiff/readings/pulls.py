@@ -164,11 +164,7 @@ def read_pulls(files: Sequence[str], machine: MachineTool, mapping: Mapped = Non
         empty = len(table.rows) - len(loaded.rows)
         notes += [
             *table.notes,
-            *(
-                [f"{table.file}: {empty} rows of no force, or of which nothing was read, are passed over"]
-                if empty
-                else []
-            ),
+            *([f"{table.file}: {empty} rows of no force, or without a reading, are skipped"] if empty else []),
             *unused(table, used),
         ]
     if not rows:

@@ -148,7 +148,7 @@ def read_raw(table: Table) -> tuple[list[Loop], list[str]]:
         raise MeasurementError(fault, file=table.file, line=table.heading_line)
     notes = unused(table, (*PLACE, *READINGS, "strut"))
     if lost:
-        fault = f"{len(lost)} records without force or displacement are passed over, from line {lost[0]}"
+        fault = f"{len(lost)} records without force or displacement are skipped, from line {lost[0]}"
         notes.append(f"{table.file}: {fault}")
     loops = [_loop(group, table.file) for group in groups.values()]
     return sorted(loops, key=lambda loop: loop.line), notes

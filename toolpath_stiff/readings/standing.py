@@ -34,7 +34,7 @@ def standing(
 
     def refuse(wrong: BoolArray, text: str, expected: str = "", hint: str = "") -> None:
         first, *more = np.flatnonzero(wrong).tolist()
-        text += f" (so in {len(more)} more rows)" if more else ""
+        text += f" (and in {len(more)} more rows)" if more else ""
         file, line = places[first]
         errors.append(MeasurementError(text, expected=expected, hint=hint, file=file, line=line))
 

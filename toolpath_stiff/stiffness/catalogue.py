@@ -4,7 +4,6 @@ Which effects there are: the packaged ones and those of a user's files.
 """
 
 import difflib
-import os
 import pkgutil
 import sys
 from collections.abc import Iterable
@@ -16,7 +15,6 @@ from types import ModuleType
 from typing import ClassVar
 
 from toolpath_stiff.errors import EffectError, InputError
-from toolpath_stiff.files import is_file
 from toolpath_stiff.hints import command_line, options
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.results import DataFrame, Result, frame_of
@@ -92,10 +90,10 @@ def effects_from_file(file: str | Path) -> dict[str, Effect]:
         There is no such file, it fails when it is run (with the line), or what it declares is wrong.
     """
     path = Path(file)
-    if not is_file(path):
-        there = os.path.lexists(path)
-        hint = "" if there or path.suffix != ".py" else f"`{command_line('effects', 'new', path)}` writes one"
-        raise EffectError(f"effects file {str(file)!r} {'is not a file' if there else 'does not exist'}", hint=hint)
+    if not path.is_file():
+        new = path.suffix == ".py" and not path.exists()
+        hint = f"`{command_line('effects', 'new', path)}` writes one" if new else ""
+        raise EffectError(f"no effects file {str(file)!r}", hint=hint)
     state = path.stat()
     return _loaded(str(file), path.resolve(), state.st_mtime_ns, state.st_size)
 

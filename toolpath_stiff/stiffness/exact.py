@@ -220,8 +220,8 @@ def _settle(model: StiffnessModel, loaded: LoadPath, parallel: FloatArray, wrenc
     if len(rows):
         names = ", ".join(active.effect.name for active in model.effects if active.effect.load_dependent)
         raise EffectError(
-            f"the strut forces do not settle{at_pose(part, rows[0])} under {part.force[rows[0]]:g} N with {names}",
-            expected="a stretch of each strut that grows with its force",
+            f"the strut forces do not converge{at_pose(part, rows[0])} under {part.force[rows[0]]:g} N with {names}",
+            expected="a strut deformation that grows with the force",
         )
     loaded.strut_forces[regular] = part.strut_forces
 
@@ -316,7 +316,7 @@ def _impossible(model: StiffnessModel, path: LoadPath, row: int, part: str) -> E
     names = ", ".join(effect.name for effect in foreign or effects)
     cause, hint = f"machine {path.machine_tool.name}", "check the parameters of the effects, strut law and joints"
     if foreign:
-        hint = f"`{command_line('effects', 'check', file_of(foreign[0]))}` tries an effect by itself"
+        hint = f"`{command_line('effects', 'check', file_of(foreign[0]))}` tests an effect by itself"
     return EffectError(
         f"with {f'effect {names}' if names else cause} {part} has no positive stiffness{at_pose(path, row)}",
         expected="a compliance that is finite, symmetric and positive definite",

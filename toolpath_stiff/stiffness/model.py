@@ -34,7 +34,7 @@ from toolpath_stiff.units import m_from_nm
 NO_SETUP = "none"  # a user's word for a set-up to which no effect belongs
 STEP = 0.01  # of a standard deviation, step of differences: stiffness is linear over it, and rounding far smaller
 WORDS = {
-    "temperature_C": "the temperature, which nobody gives (--temperature)",
+    "temperature_C": "the temperature, which is not given (--temperature)",
     "time_min": "the time since an indicator was zeroed, which no program has",
     "direction": "the direction of a reading, which no program has",
 }
@@ -288,7 +288,7 @@ def waiting_effects(model: StiffnessModel) -> dict[str, str]:
     for active in model.effects:
         options = f"(--setup {shlex.quote(active.setup or 'NAME')}, or --setup {NO_SETUP})"
         which = f"the set-up {active.setup!r}" if active.setup else "the set-up"
-        words = WORDS | {SETUP: f"{which}, and nobody says which this is {options}"}
+        words = WORDS | {SETUP: f"{which}, and it is not known which one this is {options}"}
         if missing := [words[condition] for condition in active.waits_for if condition not in model.conditions.known]:
             waiting[active.effect.name] = f"it needs {'; '.join(missing)}"
     return waiting
@@ -349,7 +349,7 @@ def condition_warnings(model: StiffnessModel) -> list[str]:
     warnings = list(model.unchecked)
     if model.instruments:
         names = ", ".join(active.effect.name for active in model.instruments)
-        warnings.append(f"instruments set aside, they act on readings and not on the machine: {names}")
+        warnings.append(f"instrument effects ignored, since they act on readings and not on the machine: {names}")
     warnings += [f"{name} does not act: {reason}" for name, reason in waiting_effects(model).items()]
     if secant := ", ".join(active.effect.name for active in acting_effects(model) if active.effect.load_dependent):
         warnings.append(f"softest and stiffest directions are those without {secant}, the stiffness along them is with")

@@ -39,7 +39,6 @@ CONSTANT_UNITS = {
     "temperature": ("C", 1.0),
 }
 PLAIN = ("power", "side", *PAIR)
-SCALES = ("reach", "width", "period", "reference")  # constants that a shape divides by
 LARGEST = 1e9
 SHAPE_KEYS = ("varies_with", "of", "shape", "constants")
 KEYS = ("name", "size", "meaning", "link", "action", "where", "along", *SHAPE_KEYS, "times")
@@ -166,13 +165,6 @@ def _shape(toml: TomlReader, where: str, row: Document, action: str, of: str) ->
     values = tuple((name, numbers[key]) for (key, _), name in keys.items())
     if pair and not {dict(values)[name] for name in pair} <= set(range(1, 7)):
         raise toml.error("first and second", "two numbers of struts, 1 to 6", where=f"{where}.constants")
-    at = dict(values)
-    if not all(at.get(name, 1.0) for name in SCALES) or at.get("end", 1.0) in (at.get("start"), at.get("from")):
-        raise toml.error(
-            f"{where}: {shape} of no width",
-            "constants that differ from 0 and from each other",
-            where=f"{where}.constants",
-        )
     return variable, shape, values, column
 
 

@@ -29,7 +29,7 @@ def do(session: Session, question: Document) -> Document:
     """Carry out the action that a page requests. Raises `InputError` if it is impossible."""
     name = str(question.get("do"))
     if name not in ACTIONS:
-        raise InputError(f"nothing called {name!r} can be done")
+        raise InputError(f"unknown action {name!r}")
     given = {key: value for key, value in question.items() if key != "do"}
     with session.lock:
         session.message = ""

@@ -47,7 +47,7 @@ def serve(case: Case, port: int = 0, *, browser: bool = True) -> int:
         studio = Studio(session, port)
     except OSError as error:
         session.close()
-        raise InputError(f"port {port}: {error.strerror}", hint="leave --port out: a free one is taken") from None
+        raise InputError(f"port {port}: {error.strerror}", hint="leave --port out to use a free one") from None
     print(f"case    {Path.cwd()}\nstudio  {studio.address}\nCtrl-C ends it", flush=True)
     signal.signal(signal.SIGTERM, lambda *_: threading.Thread(target=studio.close).start())
     if browser:

@@ -188,7 +188,7 @@ class Handler(BaseHTTPRequestHandler):
         # Programs may have any suffix; everything among the results was written by the tool.
         known = PLAIN.get(file.suffix, "text/plain" if room == "results" else "")
         if not known or "exercise" in room or not is_file(file):
-            return self._send(HTTPStatus.NOT_FOUND, "there is no such file in the case", "text/plain")
+            return self._send(HTTPStatus.NOT_FOUND, "the case has no such file", "text/plain")
         saved = "" if file.suffix in (".html", ".png", ".svg") else file.name
         return self._send(HTTPStatus.OK, file.read_bytes(), known, saved, {"Content-Security-Policy": SANDBOX})
 

@@ -39,6 +39,10 @@ def offset_move(state: State, cutter: RadiusCompensation, move: Move, control: l
         programmed = OffsetArc(step.center, programmed.turn, programmed.turns)
     end = cutter.moved(there, cutter.center if step is None else step.end)
     recorded = _add(state, cutter, replace(move), end, programmed)
+    place = state.plain.feed_place
+    if place and programmed is not None and recorded is not None:
+        share = abs(cutter.center - programmed.center) / abs(target - programmed.center)
+        recorded.feed *= share if place == "CFC" or (place == "CFIN" and share < 1.0) else 1.0
     if programmed is not None and not programmed.programmed and recorded is not None:
         programmed.programmed = recorded.arc.sweep if recorded.arc else 0.0
     cutter.pending.append(Pending(end, direction, programmed, recorded))

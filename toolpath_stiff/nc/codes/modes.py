@@ -15,7 +15,7 @@ def units(state: State, block: CurrentBlock, code: str) -> None:
     state.inch = inch
 
 
-def no_units(state: State, block: CurrentBlock, code: str) -> None:
+def units_or_cycle(state: State, block: CurrentBlock, code: str) -> None:
     """G70, G71 that are not G20 and G21 by dialect or controller file: taken as units unless with a cycle's words."""
     what = "is inch or metric units on some controls, a cycle on others"
     hint = 'write G20 or G21, or give a controller file with inch_metric = "G70 G71"'
@@ -53,7 +53,7 @@ _POLAR = f"{FANUC} of the series 16 and 15i, Polar coordinate command (G15, G16)
 MODE_CODES = (
     *family({"G17": "plane XY", "G18": "plane ZX", "G19": "plane YZ"}, "plane", plane, g_codes("G17 - G19.1")),
     *family({"G20": "inch", "G21": "mm"}, "units", units, g_codes("G20 G21")),
-    *family({"G70": "inch, as G20", "G71": "mm, as G21"}, "units", no_units, _INCH, ("generic", "fanuc")),
+    *family({"G70": "inch, as G20", "G71": "mm, as G21"}, "units", units_or_cycle, _INCH, ("generic", "fanuc")),
     *family({"G90": "absolute", "G91": "incremental"}, "distance", distance, g_codes("G90 G91")),
     *family(_CENTERS, "arc distance", arc_distance, g_codes("G90.1 G91.1")),
     *family({"G15": "Cartesian words", "G16": "polar words"}, "polar", polar_mode, _POLAR),

@@ -41,12 +41,12 @@ def list_numbers(state: State, block: CurrentBlock) -> None:
     changes = "M tool change" in block.groups or "T" in block.values
     if block.has("D") and (changes or "tool length" in block.groups):
         block.take("D")
-        state.note(block.line, block.values["D"], "the number of a radius offset, which acts with G41 and G42 alone")
+        state.note(block.line, block.values["D"], "the number of a radius offset, which acts only with G41 and G42")
     if block.has("H") and (changes or "G49" in block.codes):
         has_length = not math.isnan(state.tool_length)
         block.refuse_if(has_length, "H", "without G43, while a tool length is in force", "G43 beside it")
         state.named_length = block.take("H")
-        state.note(block.line, block.values["H"], "the number of a tool length, which acts with G43 alone")
+        state.note(block.line, block.values["H"], "the number of a tool length, which acts only with G43")
 
 
 def tool_length(state: State, block: CurrentBlock, code: str) -> None:

@@ -87,7 +87,7 @@ def from_(state: CutterLocationState, statement: MajorStatement) -> None:
     numbers = state.numbers(statement, 3, 6)
     axis = _axis_of(state, numbers)
     if len(state.recorder):
-        text = "FROM within the path: the tool is taken to stand there; how it got there is not given"
+        text = "FROM within the path: the tool is assumed to be there; the way to this point is not given"
         state.warnings.append(Remark(text, statement.line))
     state.no_circle("FROM/")
     stand(state, state.scaled(numbers[:3]), axis)

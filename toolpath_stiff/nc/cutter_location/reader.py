@@ -31,7 +31,7 @@ PACKED_AT = 50_000  # moves
 
 
 def not_for(request: Request) -> list[Remark]:
-    """Warning about requested options that mean nothing to a cutter-location file."""
+    """Warning about requested options that do not apply to a cutter-location file."""
     controller = request.controller
     given = {
         "a dialect": controller.dialect.name != "generic",
@@ -39,7 +39,7 @@ def not_for(request: Request) -> list[Remark]:
         "posted kinematics": controller.kinematics is not None,
         "block-delete switches": bool(request.controller.switches),
     }
-    return [Remark(f"{what} mean nothing to a cutter-location file") for what in given if given[what]]
+    return [Remark(f"{what} do not apply to a cutter-location file") for what in given if given[what]]
 
 
 class CutterLocationRun(ProgramRun):

@@ -20,9 +20,9 @@ from toolpath_stiff.nc.state import Record
 from toolpath_stiff.nc.strokes import Drilling, strokes
 from toolpath_stiff.nc.tables import LARGEST_MM, tool_of
 
-FIRST_POINT = "the path begins at the file's first point; where the tool comes from is not given (no FROM)"
+FIRST_POINT = "the path begins at the file's first point; the start position of the tool is not given (no FROM)"
 FREE_YAW = "the turn of the tool about its own axis (yaw) is free in a cutter-location file; it is 0"
-TURN_FEED = "where the tool turns about its standing tip, a feed of 1 mm/min counts as 1 degree per minute"
+TURN_FEED = "where the tool turns about its stationary tip, a feed of 1 mm/min counts as 1 degree per minute"
 PECKS = "a drilling cycle with STEP or INCR ends its rapids 0.254 mm above the last depth, as LinuxCNC does"
 NOT_MOVED = (False, False)
 

@@ -152,7 +152,7 @@ TABLE = (
     *listed(TOOL, CAMPLETE, POSTS, "CSI_SET_FLUTE_LENGTH CSI_SET_EXTENSION_LENGTH"),
     *listed("in which system the machine is", SOLIDWORKS, SAMPLES, "TRNTYP"),
     *listed("coolant", ALL, ISO, "COOLNT FLUSH"),
-    *listed("a plane to retract to, of which nothing is made without RETRCT", "", ISO, "CLEARP CLRSRF"),
+    *listed("a plane to retract to, which has no effect without RETRCT", "", ISO, "CLEARP CLRSRF"),
     *listed("the part surface; the points have its height already", CATIA, DASSAULT, "AUTOPS PSIS"),
     *listed("clamps of machine axes", "", ISO, "CLAMP UNCLMP"),
     *listed("an M code of one control: what it does is not known", "", ISO, "AUXFUN", DOUBTFUL),

@@ -42,13 +42,15 @@ OLDER = {
 KNOWN = {"Q200", "Q201", "Q202", "Q203", "Q204", "Q205", "Q206", "Q208", "Q210", "Q211", "Q212", "Q213", "Q214", "Q239",
          "Q256", "Q257", "Q258", "Q259", "Q253", "Q336", "Q343", "Q344", "Q351", "Q379", "Q395", "Q403", "Q301", "Q365",
          "Q357", "Q359", "Q350", "Q426", "Q427", "Q428", "Q429", "Q430", "Q435", "Q401", "Q207", "Q215", "Q220", "Q224",
-         "Q334", "Q338", "Q342", "Q366", "Q367", "Q368", "Q369", "Q370", "Q374", "Q385", "Q437"}  # fmt: skip
+         "Q334", "Q338", "Q342", "Q366", "Q367", "Q368", "Q369", "Q370", "Q374", "Q385", "Q437", "Q439"}  # fmt: skip
 FEEDS = ("Q206", "Q207", "Q208", "Q253", "Q385")
 LEAST_AHEAD_MM, MOST_AHEAD_MM = 0.6, 7.0  # end of the older pecking's rapids above the last depth
 MOST_POINTS = 1000
-_FORM = re.compile(r"(POS|ROW|PAT|CIRC|PITCHCIRC)\d+\s*\(([^)]*)\)")
 _WORD = re.compile(r"(I?[A-Z]+)\s*([^A-Z\s]\S*|Q[LR]?\d+)")
-FORMS = "POS, ROW, PAT, CIRC, PITCHCIRC with their words in brackets"
+FORMS = {"POS": "X Y", "ROW": "X Y D NUM", "PAT": "X Y DX DY NUMX NUMY", "CIRC": "X Y D NUM",
+         "PITCHCIRC": "X Y D NUM STEP"}  # fmt: skip
+UNASKED = {"Z", "ROT", "ROTX", "ROTY", "START"}  # words of PATTERN DEF that may be missing: 0
+_FORM = re.compile(rf"({'|'.join(FORMS)})\d+\s*\(([^)]*)\)")
 HAVE_NO_SHIFT = "the shift off the wall before the tool leaves the hole"
 
 
@@ -244,9 +246,11 @@ def _visit(
 def pattern(state: State, block: CurrentBlock, text: str, number: Callable[[str], float]) -> None:
     """PATTERN DEF: points for CYCL CALL PAT, each with what it adds to the surface; `number` reads a value."""
     points, here, forms = list[tuple[complex, float]](), 0j, _FORM.findall(text)
-    block.refuse_if(len(forms) != text.count("(") or not forms, None, "with a form that is not known", FORMS)
+    block.refuse_if(len(forms) != text.count("(") or not forms, None, "with a form that is not known", ", ".join(FORMS))
     for kind, words in forms:
         v = defaultdict(float, {name: number(value) for name, value in _WORD.findall(words)})
+        wrong = ({name.removeprefix("I") for name in v} ^ set(FORMS[kind].split())) - UNASKED
+        block.refuse_if(wrong or _WORD.sub("", words).strip(), None, f"{kind} with other words", FORMS[kind])
         here = complex(v["X"] if "X" in v else here.real + v["IX"], v["Y"] if "Y" in v else here.imag + v["IY"])
         count, rows = (_count(block, value or 1.0) for value in (v["NUMX"] or v["NUM"], v["NUMY"]))
         along, across = _turned(v["ROT"] + v["ROTX"], v["DX"] or v["D"]), 1j * _turned(v["ROT"] + v["ROTY"], v["DY"])

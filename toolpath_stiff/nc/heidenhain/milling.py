@@ -27,33 +27,38 @@ MILLED = {
     256: (*_ALL, "Q218", "Q219", "Q424", "Q425"), 257: (*_ALL, "Q222", "Q223"),
 }  # fmt: skip
 OLD, BORE, SLOT, STUDS = (4, 5), 208, 253, (256, 257)
-# Where the tool stands at the call (Q367), in half lengths and widths from the middle; along a slot, where 2 and 3 are
-# the centres of its ends.
-PLACES = ((0.0, 0.0), (-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0))
-SLOT_PLACES = (0.0, -1.0, -1.0, 1.0, 1.0)
+# Where the tool stands at the call (Q367), from the middle: half lengths and half widths along, half widths across; in
+# slots 2 and 3 are the centres of the ends.
+PLACES = ((0, 0, 0), (-1, 0, -1), (1, 0, -1), (1, 0, 1), (-1, 0, 1))
+SLOT_PLACES = ((0, 0, 0), (-1, 0, 0), (-1, 1, 0), (1, -1, 0), (1, 0, 0))
 BESIDE_MM = 2.0  # from the blank of a stud to the tool (manual, cycle 256: "2 mm to the right of the unmachined stud")
 OLD_OVERLAP = 1.4  # of cycles 4 and 5, in radii of the tool (machine parameter 7430, at most 1.414)
-MOST_INFEEDS = 10_000
+MOST_ROUNDS = 10_000
 INSIDE = "the way into and within milled bores, pockets and slots, and to studs, is assumed: manuals only draw it"
 
 
 def mill_form(state: State, block: CurrentBlock, number: int, values: Values) -> None:
     """Carry out a milling cycle at the present point; in units of the program."""
     unit, stud, tenths = state.length_scale, number in STUDS, inch_tenths(state)
-    radius, given = tool_radius(state, block, None) / unit, defaultdict(float, values)
+    radius, given = tool_radius(state, block, None) / unit / state.plain.scale, defaultdict(float, values)
     place, high = in_plane(state, present(state)) / unit, present(state)[PLANES[state.plane][2]] / unit
     path = _form(block, number, given, place).grown(radius if stud else -radius)
     infeed, hole = given["Q334" if number == BORE else "Q202"], given["Q342"]
+    overlap = given["Q370"] or (OLD_OVERLAP if number in OLD else 1.0)
+    rings = max(path.width, given["Q424"], given["Q425"], given["Q222"]) / (overlap * radius or math.inf)
+    rounds = -given["Q201"] * max(rings, 1.0) / (infeed or 1.0)
     core = number == BORE and given["Q335"] > 4.0 * radius and not hole
     several = number == BORE and given["Q370"] and 2.0 * path.width > hole + 2.0 * given["Q370"] * radius
     for name, wrong, problem, expected in (
         ("", radius and min(path.length, path.width) < 0.0, "is narrower than its tool", "a smaller tool"),
-        ("", state.turn < 0, "under M4, where climb milling goes another way", "M3"),
-        ("", infeed < 0.0 or -given["Q201"] > MOST_INFEEDS * (infeed or 1.0), "makes too many infeeds", ""),
+        ("", state.turn < 0 or state.plain.mirrored, "under M4 or cycle 8: where climb milling goes then", "M3"),
+        ("", not 0.0 <= rounds <= MOST_ROUNDS, "makes too many rounds", "larger infeeds and steps"),
+        ("Q215", stud and "Q215" in values and (given["Q368"] or given["Q369"]), "finishes a stud", "no allowances"),
+        ("Q439", given["Q439"], "gives feeds of the cutting edge", "0"),
         ("Q335", radius and core, "is more than two tools: a core would be left", "Q342, the hole before it"),
         ("Q370", radius and several, "mills several helices, in an order that is not published", "0"),
         ("Q370", given["Q370"] < 0.0, "is no overlap", "0.1 to 1.999"),
-        ("Q207", values.get("Q207") == MAX, "mills at FMAX", "a feed"),
+        ("", given["Q206" if number == BORE else "Q207"] == MAX, "mills at FMAX", "a feed"),
     ):
         block.refuse_if(wrong, name, problem, expected)
     if not radius:  # in a check, behind the error that it is not known
@@ -66,7 +71,7 @@ def mill_form(state: State, block: CurrentBlock, number: int, values: Values) ->
     safe, far = (given["Q203"] + v for v in (given["Q200"], max(given["Q204"], given["Q200"])))
     ways = ((place, max(high, safe)), (path.middle, max(high, safe)), (path.middle, safe))
     cuts: list[Cut] = [(*way, None, None, 0) for way in ways]
-    cuts += _cuts(number, given, path, radius, (feed or 0.0, down), fine or feed or 0.0, turn)
+    cuts += _cuts(number, given, path, radius, overlap * radius, (feed or 0.0, down), fine or feed or 0.0, turn)
     cuts.append((path.middle, far, None, None, 0))
     mill(state, block, ((p * unit, h * unit, rate, None if c is None else c * unit, t) for p, h, rate, c, t in cuts))
 
@@ -79,11 +84,9 @@ def _form(block: CurrentBlock, number: int, given: Values, here: complex) -> Out
     block.refuse_if(number == SLOT and length < width, "Q218", "is shorter than the slot is wide", "the length")
     place = given["Q367"]
     block.refuse_if(place not in range(len(PLACES)), "Q367", "is no position", "0 to 4")
-    along, across = (part * half / 2.0 for part, half in zip(PLACES[int(place)], (length, width), strict=True))
-    if number == SLOT:
-        along, across = SLOT_PLACES[int(place)] * (length - width * (place in (2.0, 3.0))) / 2.0, 0.0
+    lengths, widths, across = (SLOT_PLACES if number == SLOT else PLACES)[int(place)]
     form = Outline(here, length, width, corner, math.radians(given["Q374" if number == SLOT else "Q224"]))
-    return replace(form, middle=form.at(-along, -across))
+    return replace(form, middle=form.at(-(lengths * length + widths * width) / 2.0, -across * width / 2.0))
 
 
 def _floors(top: float, bottom: float, most: float) -> list[float]:
@@ -93,15 +96,11 @@ def _floors(top: float, bottom: float, most: float) -> list[float]:
 
 
 def _cuts(
-    number: int, given: Values, path: Outline, radius: float, feeds: Feeds, fine: float, turn: int
+    number: int, given: Values, path: Outline, radius: float, step: float, feeds: Feeds, fine: float, turn: int
 ) -> Iterator[Cut]:
     """Cuts of a form: of pockets roughing (Q215 0 and 1), then what has allowances (0 and 2), walls first."""
     top, bottom, ahead, part = given["Q203"], given["Q203"] + given["Q201"], given["Q200"], given["Q215"]
-    step, half, side = (
-        radius * (given["Q370"] or (OLD_OVERLAP if number in OLD else 1.0)),
-        path.width / 2.0,
-        given["Q368"],
-    )
+    half, side = path.width / 2.0, given["Q368"]
     floors = _floors(top, bottom + given["Q369"], given["Q202"])
     if number == BORE:
         yield from sink(path, (top + ahead, bottom), feeds[1], turn, ("helix", half, given["Q334"]))

@@ -180,8 +180,10 @@ class HeidenhainRun(ProgramRun):
         place = self._place(row)._replace(column=statement.begins)
         if head.startswith("CYCL DEF 2"):
             for word in block.values.values():
-                if word.letter[0] == "Q" and not word.text.endswith(("MAX", "AUTO")):
-                    self._scope(word.letter)[word.letter] = word.value
+                scope = self._scope(word.letter) if word.letter[0] == "Q" else {}
+                scope[word.letter] = word.value
+                if word.text.endswith(("MAX", "AUTO")):  # which is no number there
+                    del scope[word.letter]
         elif head == "PATTERN DEF":
             pattern(self.state, block, rest, lambda text: self._value(row, text.replace(",", "."), statement.begins))
         elif head in CONDITIONS:

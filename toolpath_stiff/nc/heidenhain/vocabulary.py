@@ -95,9 +95,8 @@ _ROWS: Rows = (
         (f"{_parts(2, 0, 4)}|{_parts(17, 0, 3)}", cycles.define_older, "tapping, of older controls"),
     )),
     ("motion", f"{_CYCLES}, Fixed cycles: pocket milling, stud milling, slot milling", (
-        ("CYCL DEF 251|CYCL DEF 252", cycles.define, "rectangular, circular pocket"),
-        ("CYCL DEF 253", cycles.define, "slot"),
-        ("CYCL DEF 256|CYCL DEF 257", cycles.define, "rectangular, circular stud"),
+        ("CYCL DEF 251|CYCL DEF 252|CYCL DEF 253|CYCL DEF 256|CYCL DEF 257", cycles.define,
+         "rectangular, circular pocket; slot; rectangular, circular stud"),
         (f"{_parts(4, 0, 6)}|{_parts(5, 0, 5)}", cycles.define_older, "pockets, of older controls"),
     )),
     ("motion", _PATTERNS, (

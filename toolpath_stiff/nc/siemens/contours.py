@@ -35,46 +35,40 @@ def elements_of(drawn: State, block: CurrentBlock) -> list[Element]:
 
 
 def mill_contour(state: State, block: CurrentBlock, code: str) -> None:
-    """CYCLE72: lead in on a line or an arc, along the contour, lead out; at each depth."""
+    """CYCLE72: at each depth lead in on a line or an arc, along the contour, lead out; up to TOP in between."""
     values, radius = begin(state, block, code)
-    contour, side, finish = state.plain.contour, SIDES.get(values["RL"]), digit(values["VARI"], 0) == FINISH
-    if side is None:
-        raise block.fail("RL", "is no side", "40, 41, 42")
+    contour, finish = state.plain.contour, digit(values["VARI"], 0) == FINISH
+    block.refuse_if(values["RL"] not in SIDES, "RL", "is no side", "40, 41, 42")
     block.refuse_if(values["VARI"] >= 1000.0, "VARI", "goes along the contour backward", "up to 332")
-    apart, leads = (
-        (radius + (0.0 if finish else values["FAL"])) * abs(side),
-        list[tuple[complex, complex, complex | None]](),
-    )
+    side, leads = SIDES[values["RL"]], list[tuple[complex, complex, complex | None]]()
+    apart = abs(side) * (radius + (0.0 if finish else values["FAL"]))
     for name, way, place, element in (("1", -1, contour[0][0], contour[0]), ("2", 1, contour[-1][1], contour[-1])):
         kind, size, ahead = values[f"AS{name}"], values[f"LP{name}"], direction(element, place)
         wrong = kind not in (1.0, 2.0, 3.0) or size <= 0.0 or (kind > STRAIGHT and not side)
         block.refuse_if(wrong, f"AS{name}", "is no lead in the plane with a length (LP1, LP2)", "1; 2, 3 beside a side")
         beside = place + side * apart * 1j * ahead
-        center = beside + side * size * 1j * ahead
+        center = None if kind == STRAIGHT else beside + side * size * 1j * ahead
         turned = -1.0 if kind == HALF else side * way * 1j
-        away = beside + way * size * ahead if kind == STRAIGHT else center + (beside - center) * turned
-        leads.append((away, beside, None if kind == STRAIGHT else center))
+        away = beside + way * size * ahead if center is None else center + (beside - center) * turned
+        leads.append((away, beside, center))
     (start, into, before), (stop, out, after) = leads
-    feed, ahead_mm, between = values["FFP1"], values["TOP"] - values["RFP"], values["FF3"] or values["FFP1"]
-    floors, path = layers(values["TOP"], values["DP" if finish else "FLOOR"], values["MID"]), list[Cut]()
-    path = approached(state, values, start)
-    for floor in floors:
-        mill(state, block, [*path, (start, floor, values["FFD"], None, 0), (into, floor, feed, before, side)])
+    down, feed, above = values["FFD"], values["FFP1"], values["TOP"]
+    mill(state, block, approached(state, values, start))
+    for floor in layers(above, values["DP" if finish else "FLOOR"], values["MID"]):
+        way_in: list[Cut] = [
+            (start, above, None, None, 0),
+            (start, floor, down, None, 0),
+            (into, floor, feed, before, side),
+        ]
+        mill(state, block, way_in)
         if side:
             state.assume(COMPENSATED)
-            state.cutter = RadiusCompensation(
-                side, apart, PLANES[state.plane], state.length_scale, straight=True, rounded=True
-            )
-        with block.placing():
-            mill(state, block, [(contour[0][0], floor, feed, None, 0)])
-            mill(state, block, [(end, floor, feed, center, turn) for _, end, center, turn in contour])
-            switch_off(state, block, code)
-        lifted = (values["RTP"], values["TOP"], floor + ahead_mm, floor)[min(digit(values["VARI"], 2), 3)]
-        lifted = values["RTP"] if floor == floors[-1] else lifted
-        leave: list[Cut] = [
-            (out, floor, feed, None, 0),
-            (stop, floor, feed, after, side),
-            (stop, lifted, None, None, 0),
-        ]
-        mill(state, block, leave)
-        path = [(start, lifted, between if digit(values["VARI"], 1) else None, None, 0)]
+            axes = PLANES[state.plane]
+            state.cutter = RadiusCompensation(side, apart, axes, state.length_scale, straight=True, rounded=True)
+        mill(state, block, [(contour[0][0], floor, feed, None, 0)])
+        mill(state, block, [(end, floor, feed, center, turn) for _, end, center, turn in contour])
+        switch_off(state, block, code)
+        mill(
+            state, block, [(out, floor, feed, None, 0), (stop, floor, feed, after, side), (stop, above, None, None, 0)]
+        )
+    mill(state, block, [(stop, values["RTP"], None, None, 0)])

@@ -125,16 +125,12 @@ def _pocket(state: State, block: CurrentBlock, code: str, values: Values, radius
 
 
 def _spigot(state: State, block: CurrentBlock, code: str, values: Values, radius: float) -> Iterator[Cut]:
-    """Round it at each depth, from the blank inward; finished in one round."""
-    outline, rough = _outline(block, code, values), digit(values["VARI"], 0) == ROUGH
-    sides, blank = values["FAL"] * rough, (values["AP1"] or values["PRAD"] or values["LENG"], values["AP2"])
-    beyond = max(blank[0] - (values["PRAD"] or values["LENG"]), blank[1] - values["WID"]) / 2.0 - sides
-    count = max(1, math.ceil(beyond / (STEP_SHARE * 2.0 * radius) - 1e-9)) if rough else 1
+    """Once round it at each depth: what the blank has beyond the tool's width is taken to be gone."""
+    rough, outline = digit(values["VARI"], 0) == ROUGH, _outline(block, code, values)
     floors = layers(values["TOP"], values["FLOOR" if rough else "DP"], values["MID"])
     heights, turn = (floors, values["TOP"], values["TOP"] - values["RFP"]), _turn(state, block, values, -1)
-    for index in range(count - 1, -1, -1):
-        ring = outline.grown(radius + sides + index * beyond / count)
-        yield from edge(ring, heights, (values["FFP1"], values["FFD"]), turn, -radius)
+    path = outline.grown(radius + values["FAL"] * rough)
+    yield from edge(path, heights, (values["FFP1"], values["FFD"]), turn, -radius)
 
 
 def _face(state: State, block: CurrentBlock, code: str, values: Values, radius: float) -> Iterator[Cut]:

@@ -64,7 +64,7 @@ class SiemensRun(ParametricRun):
         plain, text = self.state.plain, "\n".join(map(code_text, self.lines))
         self._of_lathe = None if ALONG_Y.search(text) else OF_LATHES.search(text)
         plain.offsets_named, plain.changes_by_t = OFFSET.search(text) is not None, CHANGE.search(text) is None
-        self.state.motion = "G1"  # a control's state at power-on
+        self.state.motion, plain.feed_place = "G1", "CFC"  # a control's state at power-on
 
     def _lex(self) -> None:
         """Find programs and labels; plain blocks are left to the reader of plain lines."""

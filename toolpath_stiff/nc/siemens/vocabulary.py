@@ -44,6 +44,11 @@ def entry(state: State, block: CurrentBlock, code: str) -> None:
     block.refuse_if(state.cutter is not None and state.plain.entry, code, "while G41 or G42 is on", "NORM and G450")
 
 
+def feed_place(state: State, block: CurrentBlock, code: str) -> None:
+    """CFC, CFIN, CFTCP: F holds on a compensated contour's arcs, on inside ones, or for the tool's centre."""
+    state.plain.feed_place = code
+
+
 def dwell(state: State, block: CurrentBlock, code: str) -> None:
     """G4 F: a pause in seconds; G4 S: in revolutions of the spindle."""
     seconds, turns = (time_word(state, block, letter) for letter in "FS")
@@ -99,6 +104,9 @@ _ROWS: Rows = (
     ("path control", f"{BASICS}, Tool radius compensation", (
         ("NORM KONT G450 G451", entry, "how a compensated contour begins, and its outside corners"),
     )),
+    ("path control", f"{BASICS}, Feedrate optimization for curved path sections", (
+        ("CFC CFIN CFTCP", feed_place, "where F holds beside arcs"),
+    )),
     ("T", f"{BASICS}, Tool change", (("T", tools.select, "tool"),)),
     ("M tool change", f"{BASICS}, Tool change", (("M6", tools.change, "tool change"),)),
     ("tool length", f"{BASICS}, Tool offsets", (("D", tools.edge, "cutting edge: length and radius"),)),
@@ -135,7 +143,7 @@ LISTED = {
         "how the control plans ahead: the path is taken as programmed":
             "G9 G60 G64 G601 G602 G603 G641 G642 G643 G644 G645 G62 G621 BRISK BRISKA SOFT SOFTA DRIVE FFWON FFWOF "
             "COMPON COMPCURV COMPCAD COMPSURF COMPOF CYCLE832 DYNNORM DYNPOS DYNROUGH DYNSEMIFIN DYNFINISH DYNPREC "
-            "FIFOCTRL STARTFIFO STOPFIFO RTLION RTLIOF UPATH SPATH FNORM FLIN FCUB CFC CFIN CFTCP CUT2D "
+            "FIFOCTRL STARTFIFO STOPFIFO RTLION RTLIOF UPATH SPATH FNORM FLIN FCUB CUT2D "
             "CPRECON CPRECOF FGROUP ORISON ORISOF ORIWKS ORIMKS ORIRESET CDON CDOF CDOF2 G460 G461 G462 OST OSOF G290 "
             "HIGH_SPEED ORIVECT ORIPLANE ORIAXES",
         "message, stop of the look-ahead, display":

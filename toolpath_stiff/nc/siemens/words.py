@@ -117,6 +117,7 @@ def _addressed(scanner: SiemensScanner, name: str, column: int, begin: int) -> W
 def _offset(scanner: SiemensScanner, index: str, column: int) -> list[Word]:
     """A settable offset: $P_UIFR[1]=CTRANS(X,10,Y,5), $P_UIFR[1,X,TR]=10."""
     number, *part = index.strip("[]").split(",")
+    scanner.refuse_if(not number.isdigit(), f"$P_UIFR{index} without its number", "$P_UIFR[1]", column=column)
     words = [Word("$P_UIFR", float(number), column, f"$P_UIFR{index}")]
     if part:
         known = len(part) == 2 and part[0] in tuple(AXES) and part[1] == "TR"
