@@ -153,6 +153,7 @@ def _densely(start: np.ndarray, points: np.ndarray) -> np.ndarray:
 REFUSALS = {
     "FL AN+90 LEN5\nFSELECT 2": ("FSELECT is a choice of solutions", 4),
     "FL X+10": ("not determined by its own data", 3),
+    "CYCL DEF 200 D Q200=2 Q201=-5 Q206=9 Q202=5 Q203=0\nFL AN+90 M99": ("calls a cycle inside a contour", 4),
     "FL AN+90\nL X+10": ("not determined by its own data", 3),
     "FL X+9 Y+9 AN+90": ("contradict each other", 3),
     "FL X+9 AN+90\nFL X+9 Y+9 AN+0": ("not determined|contradict", 3),

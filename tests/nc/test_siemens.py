@@ -94,6 +94,7 @@ REFUSALS = {
     'T1 D1\nCYCLE72("NOWHERE",10,0,1,-3,0,0,0,300,100,1,41,2,4,300,1,3)': "NOWHERE is no word.*--subprograms",
     'T1 D1\nCYCLE72("A:B",10,0,1,-3,0,0,0,300,100,1,41,2,4,300,1,3)': "no such label",
     'T1 D1\nAB: X1 Y2\nBC:\nCYCLE72("AB:BC",10,0,1,-3,0,0,0,300,100,1,41,2,4,300,1,3)': "CYCLE72 along no contour",
+    'T1 D1\nAB: X1\nX5 Y3\nBC:\nCYCLE72("AB:BC",10,0,1,-3,0,0,0,9,9,1,41,2,4,300,1,3)': "say where it begins",
     'T1 D1\nAB: X1 Y2\nX5 Z1\nBC:\nCYCLE72("AB:BC",10,0,1,-3,0,0,0,9,9,1,41,2,4,300,1,3)': "leaves its plane",
     'T1 D1\nAB: X1 Y2\nX5\nBC:\nCYCLE72("AB:BC",10,0,1,-3,0,0,0,9,9,1,41,12,4,300,1,3)': "AS1=12 is no lead",
     'T1 D1\nAB: X1 Y2\nX5\nBC:\nCYCLE72("AB:BC",10,0,1,-3,0,0,0,9,9,1,43,1,4,300,1,3)': "RL=43 is no side",

@@ -17,7 +17,7 @@ from toolpath_stiff.nc.codes.registry import code_meaning
 from toolpath_stiff.nc.codes.saved import leave_call
 from toolpath_stiff.nc.interpreter import execute
 from toolpath_stiff.nc.lines import read_lines
-from toolpath_stiff.nc.moves import Jump, ReadProgram, Remark
+from toolpath_stiff.nc.moves import PACKED_AT, Jump, ReadProgram, Remark
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.plain_lines import PlainRun
 from toolpath_stiff.nc.plain_words import PlainWords
@@ -82,9 +82,11 @@ class ProgramRun:
     @collector_at_rest()
     def run(self) -> list[Remark]:
         """Run to the program's end; returns warnings. Raises `InputError` with the line."""
-        row, begun, numbered = 0, False, False  # after the first word, a tape mark is the last one
+        state, row, begun, numbered = self.state, 0, False, False  # after the first word, a tape mark is the last one
         while row < len(self.lines):
             self._at = row
+            if state.cutter is None and state.corner is None:  # these change the last moves
+                state.recorder.pack(PACKED_AT)
             words = self._plain.execute(row) if self._plain is not None and not self._levels else None
             if words is not None:
                 self._tally_plain(row, words)
@@ -171,6 +173,8 @@ class ProgramRun:
 
     def _place(self, row: int) -> Place:
         """File, and line in it (from 1), of the line `row` of all lines read."""
+        if row < self._main_lines:
+            return Place(self.name, row + 1)
         in_files = (Place(name, row - first + 1) for first, stop, name in self._files if first <= row < stop)
         return next(in_files, Place(self.name, row + 1))
 

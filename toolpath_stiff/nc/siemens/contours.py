@@ -3,6 +3,8 @@
 SIEMENS, SINUMERIK 840D, Programming Guide Cycles (11/2002), "Milling cycles", "Path milling - CYCLE72".
 """
 
+import cmath
+
 from toolpath_stiff.nc.codes.cutter import switch_off
 from toolpath_stiff.nc.compensation import RadiusCompensation
 from toolpath_stiff.nc.elements import Element, direction
@@ -22,6 +24,9 @@ def elements_of(drawn: State, block: CurrentBlock) -> list[Element]:
     contour, trace = list[Element](), drawn.trace or []
     for move in trace[1:]:
         begins, ends = (complex(point[first], point[second]) for point in (move.start, move.end))
+        block.refuse_if(
+            cmath.isnan(begins), None, "CYCLE72 along a contour that does not say where it begins", "X and Y"
+        )
         level = abs(move.end[normal] - move.start[normal]) < LEAST_MM
         block.refuse_if(not level, None, "CYCLE72 along a contour that leaves its plane", "moves in the plane")
         if move.arc is not None:
