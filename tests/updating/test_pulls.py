@@ -395,7 +395,7 @@ def test_poses_in_other_axes_than_the_joints(tmp_path: Path) -> None:
         if angle < 1.0:
             assert f"other axes, xyz_mm = {(-turn.T @ shift).round(1).tolist()}" in str(tps.diagnose(data, ROBOT))
             continue
-        with pytest.raises(tps.TpsError, match=r"90.csv:2: .*so in 19 more rows\); expected .*\[work\] (.*)") as error:
+        with pytest.raises(tps.TpsError, match=r"90.csv:2: .*and in 19 more rows\); expected .*\[work\] (.*)") as error:
             tps.diagnose(data, ROBOT)
         keys = str(error.value).split("[work] ")[1].split(". ")[0].replace(", rpy", "\nrpy")
         work = tmp_path / "work.toml"
