@@ -114,7 +114,7 @@ def test_what_lies_upon_another_segment_is_drawn_once_and_the_picture_stays(monk
 
 
 def test_a_command_leaves_lists_of_properties_out_of_docstrings_and_the_library_does_not():
-    lines = ("from toolpath_stiff.report.folder import pictures_of, skip_docstrings", "skip_docstrings()")
+    lines = ("from toolpath_stiff.report.folder import pictures_of, quicken_pictures", "quicken_pictures()")
     asked = (
         "pictures_of('map')",
         "from matplotlib.lines import Line2D",

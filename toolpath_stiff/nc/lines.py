@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterator, Sequence
 from itertools import chain
 from pathlib import Path
-from typing import overload
+from typing import Any
 
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.files import check_regular
@@ -95,20 +95,13 @@ class TextLines(Sequence[str]):
     def __len__(self) -> int:
         return self._count
 
-    @overload
-    def __getitem__(self, index: int) -> str: ...
-    @overload
-    def __getitem__(self, index: slice) -> list[str]: ...
-    def __getitem__(self, index: int | slice) -> str | list[str]:
-        if not isinstance(index, slice):
-            part, place = divmod(range(self._count)[index], PORTION)
-            return self._parts[part].split("\n")[place]
+    def __getitem__(self, index: Any) -> Any:
         rows = range(self._count)[index]
-        if rows.step != 1 or not rows:
-            return [self[row] for row in rows]
-        first = rows.start // PORTION
-        lines = "\n".join(self._parts[first : (rows.stop - 1) // PORTION + 1]).split("\n")
-        return lines[rows.start - first * PORTION : rows.stop - first * PORTION]
+        if isinstance(rows, int):
+            return self._parts[rows // PORTION].split("\n")[rows % PORTION]
+        part = slice(min(rows, default=0) // PORTION, max(rows, default=-1) // PORTION + 1)
+        lines, first = "\n".join(self._parts[part]).split("\n"), part.start * PORTION
+        return [lines[row - first] for row in rows]
 
     def __iter__(self) -> Iterator[str]:
         return chain.from_iterable(part.split("\n") for part in self._parts)

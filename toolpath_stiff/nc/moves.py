@@ -342,7 +342,9 @@ class Recorder:
         return Moves(**columns | {name: held_once(columns[name]) for name in HELD})
 
     def _recent_in_si(self) -> Moves:
-        rows = dict(zip(ENTRIES, zip(*map(attrgetter(*ENTRIES), self.recent), strict=True), strict=False))
+        rows: dict[str, Sequence[Any]] = dict(
+            zip(ENTRIES, zip(*map(attrgetter(*ENTRIES), self.recent), strict=True), strict=False)
+        )
         arcs = [arc or NO_ARC for arc in rows.pop("arc", ())]
         for name in ("sweep", "center", "normal"):
             rows[f"arc_{name}"] = [getattr(arc, name) for arc in arcs]
