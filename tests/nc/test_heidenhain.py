@@ -153,7 +153,6 @@ def _densely(start: np.ndarray, points: np.ndarray) -> np.ndarray:
 REFUSALS = {
     "FL AN+90 LEN5\nFSELECT 2": ("FSELECT is a choice of solutions", 4),
     "FL X+10": ("not determined by its own data", 3),
-    "CYCL DEF 200 D Q200=2 Q201=-5 Q206=9 Q202=5 Q203=0\nFL AN+90 M99": ("calls a cycle inside a contour", 4),
     "FL AN+90\nL X+10": ("not determined by its own data", 3),
     "FL X+9 Y+9 AN+90": ("contradict each other", 3),
     "FL X+9 AN+90\nFL X+9 Y+9 AN+0": ("not determined|contradict", 3),
@@ -390,6 +389,10 @@ def test_programs_that_are_called(tmp_path):
     control = Controller(subprograms=str(tmp_path))
     check_path(read("Q5 = 2\nLBL 1\nCALL PGM SUB.H\nCALL LBL 1 REP 1\nL X+9", controller=control),
                "F 2 0 0; F 2 1 0; F 2 2 0; F 4 2 0; F 4 3 0; F 4 4 0; F 9 4 0")  # fmt: skip
+    for name, text in (("EMPTY", ""), ("BARE", "L Y+2")):  # the main program goes on behind a file that has no end
+        (tmp_path / f"{name}.H").write_text(text)
+    called = "CALL PGM EMPTY\nL X+1\nCALL PGM BARE.H\nL X+2\nCALL PGM EMPTY\nL X+3"
+    check_path(read(called, controller=control), "F 1 0 0; F 1 2 0; F 2 2 0; F 3 2 0")
 
 
 def test_check_says_the_language_why_and_what_it_needs(capsys, tmp_path):

@@ -12,7 +12,6 @@ from toolpath_stiff.nc.codes.motion import homes_standing
 from toolpath_stiff.nc.codes.passive import m_parameters
 from toolpath_stiff.nc.codes.registry import CODES, REFUSED
 from toolpath_stiff.nc.codes.tools import list_numbers
-from toolpath_stiff.nc.geometry import ArcError
 from toolpath_stiff.nc.state import LAST_MODE, CurrentBlock, Flow, Group, State, Then
 from toolpath_stiff.nc.words import AXES, CORNERS, Block, Word
 
@@ -46,10 +45,8 @@ def finish(state: State, block: CurrentBlock) -> Then:
     for code in _in_order(block, ahead=False):
         code.act(state, block, code.name)
     pending = state.corner
-    try:
+    with block.placing(increments_hint(state)):
         _move(state, block)
-    except ArcError as error:
-        raise block.fail(None, error.found, error.expected, increments_hint(state)) from None
     for letter in CORNERS:
         if block.has(letter):
             CODES[letter].act(state, block, letter)
@@ -100,9 +97,8 @@ def _sort_code(state: State, block: CurrentBlock, word: Word) -> None:
         return
     acts = word.letter == "G" or code.group == "M subprogram"  # other unknown M codes are a machine builder's
     foreign = acts and name == written and dialect.name not in code.controls
-    if foreign:
-        hint = f"there it is {code.meaning}: name the control with --dialect"
-        raise block.fail(word, f"is not a code of the dialect {dialect.name}", " or ".join(code.controls), hint)
+    hint = f"there it is {code.meaning}: name the control with --dialect"
+    block.refuse_if(foreign, word, f"is not a code of the dialect {dialect.name}", " or ".join(code.controls), hint)
     if code.listed:
         state.note(block.line, word, code.listed)
     before = block.groups.get(code.group)

@@ -4,9 +4,8 @@ This is what the reader hands on: geometry with its line, feed and tool; no mach
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
-from itertools import chain
-from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,7 +29,6 @@ RAPID, FEED, ARC, CYCLE = 0, 1, 2, 3
 CUTTER_LOCATION = "cutter-location file"
 Blank = tuple[tuple[float, float, float], tuple[float, float, float]]
 MOTION_NAMES = ("rapid", "feed", "arc", "cycle")
-PACKED_AT = 20_000  # recent moves; a move in arrays takes 250 bytes, before 1,300
 NARROW = {"line": np.int32, "motion": np.int8}  # whole numbers that a long program has many of
 KINDS = {**dict.fromkeys(("line", "motion", "tool"), np.int64), "from_machine": np.bool_}  # other columns: float
 WIDE = {"start": (6,), "end": (6,), "arc_center": (3,), "arc_normal": (3,), "from_machine": (2,)}
@@ -206,7 +204,7 @@ class ReadProgram:
 
     name: str
     path: str
-    source: tuple[str, ...]
+    source: Sequence[str]
     moves: Moves
     origin: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     origin_source: str = "default"
@@ -243,7 +241,7 @@ class Arc:
 NO_ARC = Arc((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)
 
 
-@dataclass(slots=True)
+@dataclass
 class Move:
     """A move as it is recorded, as in `Moves` but in mm, degrees, mm/min (deg/min of the rotary axes alone), 1/min."""
 
@@ -258,9 +256,6 @@ class Move:
     from_machine: tuple[bool, bool]
     arc: Arc | None = None
     dwell: float = 0.0
-
-
-ENTRIES = tuple(entry.name for entry in fields(Move))
 
 
 @dataclass
@@ -302,9 +297,9 @@ class Recorder:
         self._keep(in_si(moves))
         self.cuts = self.cuts or bool((moves.motion != RAPID).any())
 
-    def pack(self, beyond: int = 0) -> None:
-        """Move the recent moves, if there are more than `beyond`, into arrays, which take a fifth of the memory."""
-        if len(self.recent) > beyond:
+    def pack(self) -> None:
+        """Move the recent moves into arrays, which take a fifth of the memory."""
+        if self.recent:
             self._keep(self._recent_in_si())
             self.recent = []
 
@@ -334,18 +329,22 @@ class Recorder:
             column.resize((n, *column.shape[1:]), refcheck=False)
             if not column.any():  # pages never written to take no memory
                 columns[name] = np.zeros(column.shape, column.dtype)
+        start, end = columns["start"], columns["end"]
+        if n and np.array_equal(start[1:].view(np.int64), end[:-1].view(np.int64)):  # without gaps: each point once
+            points = np.concatenate([start[:1], end])
+            columns |= {"start": points[:-1], "end": points[1:]}
         return Moves(**columns | {name: held_once(columns[name]) for name in HELD})
 
     def _recent_in_si(self) -> Moves:
-        rows = dict(zip(ENTRIES, zip(*map(attrgetter(*ENTRIES), self.recent), strict=True), strict=False))
-        arcs = [arc or NO_ARC for arc in rows.pop("arc", ())]
-        for name in ("sweep", "center", "normal"):
-            rows[f"arc_{name}"] = [getattr(arc, name) for arc in arcs]
+        arcs = [move.arc or NO_ARC for move in self.recent]
+        values: dict[str, list[Any]] = {
+            "arc_sweep": [arc.sweep for arc in arcs], "arc_center": [arc.center for arc in arcs],
+            "arc_normal": [arc.normal for arc in arcs],
+        }  # fmt: skip
         columns: dict[str, NDArray[Any]] = {}
         for name in (column.name for column in fields(Moves)):
-            wide, kind, values = WIDE.get(name, ()), KINDS.get(name, float), rows.get(name, ())
-            flat = list(chain.from_iterable(values)) if wide else values
-            columns[name] = np.array(flat, kind).reshape(-1, *wide)
+            rows = values[name] if name in values else [getattr(move, name) for move in self.recent]
+            columns[name] = np.array(rows, KINDS.get(name, float)).reshape(-1, *WIDE.get(name, ()))
         return in_si(Moves(**columns))
 
 

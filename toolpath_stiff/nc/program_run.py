@@ -17,7 +17,7 @@ from toolpath_stiff.nc.codes.registry import code_meaning
 from toolpath_stiff.nc.codes.saved import leave_call
 from toolpath_stiff.nc.interpreter import execute
 from toolpath_stiff.nc.lines import read_lines
-from toolpath_stiff.nc.moves import PACKED_AT, Jump, ReadProgram, Remark
+from toolpath_stiff.nc.moves import Jump, ReadProgram, Remark
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.plain_lines import PlainRun
 from toolpath_stiff.nc.plain_words import PlainWords
@@ -82,11 +82,9 @@ class ProgramRun:
     @collector_at_rest()
     def run(self) -> list[Remark]:
         """Run to the program's end; returns warnings. Raises `InputError` with the line."""
-        state, row, begun, numbered = self.state, 0, False, False  # after the first word, a tape mark is the last one
+        row, begun, numbered = 0, False, False  # after the first word, a tape mark is the last one
         while row < len(self.lines):
             self._at = row
-            if state.cutter is None and state.corner is None:  # these change the last moves
-                state.recorder.pack(PACKED_AT)
             words = self._plain.execute(row) if self._plain is not None and not self._levels else None
             if words is not None:
                 self._tally_plain(row, words)
@@ -173,8 +171,6 @@ class ProgramRun:
 
     def _place(self, row: int) -> Place:
         """File, and line in it (from 1), of the line `row` of all lines read."""
-        if row < self._main_lines:
-            return Place(self.name, row + 1)
         in_files = (Place(name, row - first + 1) for first, stop, name in self._files if first <= row < stop)
         return next(in_files, Place(self.name, row + 1))
 
@@ -199,14 +195,17 @@ class ProgramRun:
             raise self._fail(row, f"{problem}: no variable or position changes, or nothing moves", "a loop that ends")
         self._passes[row] = now
 
-    def _load(self, names: Iterable[str], before: tuple[str, ...] = ()) -> int | None:
-        """Read the first of these files that exists in the folder; returns its first line, None if none exists."""
+    def _load(self, names: Iterable[str], before: tuple[str, ...] = (), after: tuple[str, ...] = ()) -> int | None:
+        """Read the first of these files that exists in the folder; returns its first line, None if none exists.
+
+        `before`, `after`: lines that end what stands before the file, and the file.
+        """
         files = (self.folder / name for name in names) if self.folder is not None else ()
         file = next((file for file in files if file.is_file()), None)
         if file is None:
             return None
         first = len(self.lines) + len(before)
-        self.lines = (*self.lines, *before, *read_lines(file))
+        self.lines = (*self.lines, *before, *read_lines(file), *after)
         self._files.append((first, len(self.lines), file.name))
         self._programs = self._sequence = None
         return first

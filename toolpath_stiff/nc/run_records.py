@@ -24,8 +24,6 @@ def collector_at_rest() -> Iterator[None]:
         yield
     finally:
         if was:
-            gc.freeze()  # and back: what the run has made counts as old, so that no search begins now
-            gc.unfreeze()
             gc.enable()
 
 

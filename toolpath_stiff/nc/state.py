@@ -138,21 +138,20 @@ class CurrentBlock:
     def add(self, letter: str, word: Word) -> None:
         """Add a word under its letter: each letter once, and values only up to a control's limit."""
         self.refuse_if(letter in self.values, word, "repeats a word of its block", "each word once")
-        if abs(word.value) > LARGEST_MM:
-            of_axis = letter.lstrip("I@") in {*AXES}
-            largest = LARGEST_MM if of_axis else LARGEST_WORD
-            problem = "is beyond 100 m" if of_axis else "is beyond any number that a control takes"
-            self.refuse_if(abs(word.value) > largest, word, problem, f"at most {largest:.0f}")
+        of_axis = letter.lstrip("I@") in {*AXES}
+        largest = LARGEST_MM if of_axis else LARGEST_WORD
+        problem = "is beyond 100 m" if of_axis else "is beyond any number that a control takes"
+        self.refuse_if(abs(word.value) > largest, word, problem, f"at most {largest:.0f}")
         self.values[letter] = word
         self.free.add(letter)
 
     @contextmanager
-    def placing(self) -> Iterator[None]:
-        """Add the block's place to errors of geometry (`ArcError`)."""
+    def placing(self, hint: str = "") -> Iterator[None]:
+        """Add the block's place, and a hint if given, to errors of geometry (`ArcError`)."""
         try:
             yield
         except ArcError as error:
-            raise self.fail(None, error.found, error.expected) from None
+            raise self.fail(None, error.found, error.expected, hint) from None
 
     def fail(self, culprit: Word | str | None, problem: str, expected: str = "", hint: str = "") -> InputError:
         """An error at a word of the block (given itself, or by code or letter), or at the block."""

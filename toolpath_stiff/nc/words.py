@@ -2,8 +2,7 @@
 
 pygcode 0.2.1 (unmaintained since 2017) fails on comments of both styles in one line, on `X+1` and on spaces inside
 words, drops the E of `1.5E2`, and ignores what it does not know. So comments, spaces, signs, exponents and N words are
-handled before it is called, and each word keeps its true column. The numbers of lengths, angles and feeds it reads as
-`float` does; codes and counts have forms of their own, and one that pygcode does not return is an error.
+handled before it is called, each word keeps its true column, and every word that pygcode does not return is an error.
 """
 
 import math
@@ -11,7 +10,6 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal
-from functools import lru_cache
 from typing import NamedTuple
 
 from pygcode.exceptions import GCodeWordStrError
@@ -28,7 +26,6 @@ CORNERS = (",C", ",R")  # chamfer and rounding of the corner to the next block (
 LETTERS = frozenset((*"ABCDEFGHIJKLMNPQRSTUVWXYZ", *CORNERS))
 COMMENT = re.compile("[();]")
 EXPRESSION = re.compile(r"[#\[]")
-WHOLE_WORDS = frozenset("GMTL")  # codes and counts
 NO_EXPONENT = frozenset("GMNT")  # `M67E1` is two words
 # A longer line is no block.
 LONGEST_BLOCK = 2_000  # characters without comments and blanks; LinuxCNC reads 255
@@ -212,19 +209,24 @@ def _unreadable(compact: str, position: int, column: int, place: Place) -> Input
 
 
 def through_pygcode(words: Sequence[Word], place: Place) -> None:
-    """Let pygcode read the words of `WHOLE_WORDS`; raise an error for any that it does not return exactly."""
-    for word in words:
-        if word.letter in WHOLE_WORDS and not _returned(word.letter, word.value):
+    """Let pygcode read the normalised words; raise an error for any that it does not return exactly."""
+    known = [word for word in words if word.letter not in CORNERS]
+    returned: list[tuple[str, float]] = []
+    try:
+        for word in text2words(" ".join([_plain(word) for word in known])):
+            returned.append((word.letter, float(word.value)))
+    except (GCodeWordStrError, ValueError):
+        returned.append(("", math.nan))
+    for word, read in zip(known, [*returned, ("", math.nan)], strict=False):
+        if read != (word.letter, word.value):
             code = f"a code such as {word.letter}1 or {word.letter}59.3"
             expected = code if word.letter in "GM" else "a whole number that is not negative"
             raise place.fail(f"word {word.text!r} cannot be read", expected, column=word.column)
 
 
-@lru_cache(1024)
-def _returned(letter: str, value: float) -> bool:
-    """True if pygcode returns a word, written as it can read it: without plus, exponent, decimals of 0."""
-    number = format(Decimal(repr(value)), "f").removesuffix(".0")
-    try:
-        return [(word.letter, float(word.value)) for word in text2words(letter + number)] == [(letter, value)]
-    except (GCodeWordStrError, ValueError):
-        return False
+def _plain(word: Word) -> str:
+    """The word in a form that pygcode can read: no plus, no exponent, whole numbers where it requires them."""
+    number = repr(word.value)
+    if "e" in number:
+        number = format(Decimal(number), "f")
+    return word.letter + number.removesuffix(".0")

@@ -22,6 +22,7 @@ from markupsafe import Markup
 from toolpath_stiff.defaults import VERSION
 from toolpath_stiff.documents import Document
 from toolpath_stiff.hints import parted
+from toolpath_stiff.nc.lines import TextLines
 from toolpath_stiff.report.tables import ShownTable
 from toolpath_stiff.report.words import counted, machine_text, plain
 
@@ -202,9 +203,9 @@ def json_pieces(value: Any) -> Iterator[str]:
             yield from json_pieces(entry)
             before = ","
         yield "}"
-    elif isinstance(value, list) and len(value) > LONG_LIST:
+    elif isinstance(value, list | TextLines):
         before = "["
-        for start in range(0, len(value), LONG_LIST):
+        for start in range(0, max(len(value), 1), LONG_LIST):
             yield before + _json(value[start : start + LONG_LIST])[1:-1]
             before = ","
         yield "]"

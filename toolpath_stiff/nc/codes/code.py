@@ -5,7 +5,6 @@ Each module here has a group of codes, each a function and a row; `registry` joi
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
 
 from toolpath_stiff.nc.state import STEPS, CurrentBlock, Group, State
 
@@ -54,12 +53,12 @@ class Code:
     listed: str = ""
     many: bool = False
 
-    @cached_property
+    @property
     def when(self) -> Group:
         """Step of the order of execution at which it acts."""
         return self.step or self.group
 
-    @cached_property
+    @property
     def rank(self) -> int:
         """Position in the order of execution."""
         return STEPS[self.when]
@@ -111,7 +110,6 @@ def refused(rows: Iterable[tuple[str, str, str, str]], between: str | None = Non
     return {name: Refused(name, what, hint, at) for names, what, hint, at in rows for name in names.split(between)}
 
 
-@lru_cache(1024)
 def code_name(letter: str, value: float) -> str:
     """Name of a code: `G` and 59.3 give "G59.3", `G` and 1.0 give "G1".
 

@@ -7,7 +7,7 @@ cycle") where a dialect follows them.
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.codes.code import FANUC, Code, family, g_codes
 from toolpath_stiff.nc.codes.feeds import time_word
-from toolpath_stiff.nc.codes.motion import record, record_strokes
+from toolpath_stiff.nc.codes.motion import record
 from toolpath_stiff.nc.codes.points import destination, point_words
 from toolpath_stiff.nc.moves import RAPID
 from toolpath_stiff.nc.state import CurrentBlock, State
@@ -55,7 +55,7 @@ def cycle(state: State, block: CurrentBlock, code: str) -> None:
     # As observed on LinuxCNC: a run that began below R goes to R first; otherwise a tool at or below R goes to the
     # level above the holes on its way to the next one.
     if initial < retract:
-        record_strokes(state, block, normal, [(retract, RAPID, None, 0.0)])
+        _along_normal(state, block, normal, retract, RAPID)
         here = retract
     clear = max(initial, retract) if state.retract == "G98" else retract
     level = here if here > retract + SAME_HEIGHT_MM else clear
@@ -63,13 +63,24 @@ def cycle(state: State, block: CurrentBlock, code: str) -> None:
     peck, dwell, first, less, least = (state.sticky.get(letter, 0.0) for letter in "QPIJK")
     out_at_r = code in TAPS and state.dialect.increments
     hole = Drilling(code, bottom, retract, clear, peck, dwell, first, less, least, out_at_r)
-    path = [(hole.retract, RAPID, None, 0.0), *((height, motion, None, wait) for height, motion, wait in strokes(hole))]
     for _ in range(repeats):
         place = destination(state, block, frames.to_program(frames.position), words)
         place[normal] = level
         record(state, block, RAPID, frames.to_control(place), words)
         level = clear
-        record_strokes(state, block, normal, path)
+        _along_normal(state, block, normal, hole.retract, RAPID)
+        for height, motion, wait in strokes(hole):
+            _along_normal(state, block, normal, height, motion)
+            if wait:
+                state.recorder.add_dwell(wait)
+
+
+def _along_normal(state: State, block: CurrentBlock, normal: int, height: float, motion: int) -> None:
+    frames = state.frames
+    place = frames.to_program(frames.position)
+    if place[normal] != height:
+        place[normal] = height
+        record(state, block, motion, frames.to_control(place), (normal,))
 
 
 def _repeats(state: State, block: CurrentBlock) -> int:

@@ -5,7 +5,7 @@ is known.
 """
 
 import math
-from collections.abc import Collection, Iterable
+from collections.abc import Collection
 from dataclasses import replace
 
 from toolpath_stiff.nc import geometry
@@ -25,14 +25,13 @@ from toolpath_stiff.nc.codes.points import (
     refuse_while_rotated,
     target,
 )
-from toolpath_stiff.nc.frames import STILL, shifted, shifted_back, standing
+from toolpath_stiff.nc.frames import standing
 from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Arc, Move
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES, Word
 
 ARCS = ("G2", "G3")
 MOST_TURNS = 10_000
-Stroke = tuple[float, int, float | None, float]  # height, motion, feed (None: that in force), dwell
 INCREMENTAL_AXES = "UVW"  # X, Y, Z in steps, on lathes and as G28 U0 W0 on mills
 
 
@@ -71,54 +70,6 @@ def record(
     frames.position = control
     if added:
         state.note_tool()
-
-
-def record_strokes(state: State, block: CurrentBlock, axis: int, path: Iterable[Stroke], same: float = 0.0) -> None:
-    """Record moves along one axis to heights in program coordinates; one that differs by up to `same` is no move."""
-    frames = state.frames
-    control = frames.to_control(frames.to_program(frames.position))
-    told = frames.reference is None or frames.rotated or frames.bound or control != frames.position
-    if not (told or state.height_lost or state.beside or state.cutter or state.trace is not None):
-        _record_steps(state, block, axis, path, same)
-        return
-    for height, motion, feed, wait in path:
-        place = frames.to_program(frames.position)
-        if abs(place[axis] - height) > same:
-            _set_feed(state, block, feed)
-            place[axis] = height
-            record(state, block, motion, frames.to_control(place), (axis,))
-        if wait:
-            state.recorder.add_dwell(wait)
-
-
-def _record_steps(state: State, block: CurrentBlock, axis: int, path: Iterable[Stroke], same: float) -> None:
-    """`record_strokes` where nothing but the number of the axis changes, in a third of the time."""
-    frames, recorder, moved, added = state.frames, state.recorder, False, False
-    shift, offset = frames.g92[axis], frames.offsets.at(frames.active).axes[axis]
-    level, zero = frames.position[axis], frames.fix_reference()[axis]
-    tool, still = (state.tool, state.tool_length, state.spindle), (False, False)
-    for height, motion, feed, wait in path:
-        if abs(shifted_back(level, shift, offset) - height) > same:
-            _set_feed(state, block, feed)
-            start = frames.to_setup(frames.position)
-            frames.position, level = [*frames.position], shifted(height, shift, offset)
-            frames.position[axis] = level
-            end = [*start]
-            if abs(level - zero - start[axis]) >= STILL * max(1.0, abs(start[axis])):
-                end[axis] = level - zero
-            rate = math.nan if motion == RAPID else feed_of_move(state, block, start, end, None)
-            moved, added = True, recorder.add(Move(block.line, motion, start, end, rate, *tool, still)) or added
-        if wait:
-            recorder.add_dwell(wait)
-    if moved:
-        state.length_changed = state.rotation_changed = frames.from_machine[axis] = False
-    if added:
-        state.note_tool()
-
-
-def _set_feed(state: State, block: CurrentBlock, feed: float | None) -> None:
-    block.refuse_if(feed is not None and not feed > 0.0, None, "cuts without a feed", "its feed above 0")
-    state.feed = state.feed if feed is None else feed
 
 
 def find_height(state: State, block: CurrentBlock, motion: int, named: bool) -> None:

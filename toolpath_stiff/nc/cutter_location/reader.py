@@ -19,7 +19,7 @@ from toolpath_stiff.nc.cutter_location.statements import MajorStatement, frame_i
 from toolpath_stiff.nc.cutter_location.vocabulary import execute, meaning_of
 from toolpath_stiff.nc.geometry import ArcError
 from toolpath_stiff.nc.languages import any_statement
-from toolpath_stiff.nc.moves import CUTTER_LOCATION, PACKED_AT, ReadProgram, Remark
+from toolpath_stiff.nc.moves import CUTTER_LOCATION, ReadProgram, Remark
 from toolpath_stiff.nc.program_run import ProgramRun
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.run_records import Tally
@@ -27,6 +27,7 @@ from toolpath_stiff.nc.run_records import Tally
 NO_UNITS = "the file names no UNITS; its numbers are taken as mm"
 # CATIA's heading of an operation, a comment; NX and Autodesk's posts have TOOL PATH/ and CSI_TOOL_PATH/.
 OPERATION = re.compile(r"\s*\$\$\s*OPERATION NAME\s*:\s*(.*\S)", re.IGNORECASE)
+PACKED_AT = 50_000  # moves
 
 
 def not_for(request: Request) -> list[Remark]:
@@ -77,7 +78,8 @@ class CutterLocationRun(ProgramRun):
         """Execute all lines in order."""
         state, lines, index = self.state, self.lines, 0
         while index < len(lines) and not state.ended:
-            state.recorder.pack(PACKED_AT)
+            if len(state.recorder.recent) > PACKED_AT:
+                state.recorder.pack()
             here, index = index, index + 1
             statement: MajorStatement | None = MajorStatement(here + 1, 1, "GOTO")
             point = plain_point(lines[here])

@@ -11,7 +11,7 @@ import re
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator
 
-from toolpath_stiff.nc.codes.motion import record_strokes
+from toolpath_stiff.nc.codes.motion import record
 from toolpath_stiff.nc.geometry import PLANES
 from toolpath_stiff.nc.heidenhain.contour import check_known, direction, go
 from toolpath_stiff.nc.heidenhain.milling import AUTO, MAX, MILLED, mill_form
@@ -146,8 +146,16 @@ def call(state: State, block: CurrentBlock, change: Values | None = None) -> Non
 
 def plunge(state: State, block: CurrentBlock, path: Iterable[Stroke]) -> None:
     """Carry out strokes at the present point, in mm and mm/min; a feed of 0 means that none was given."""
-    modal, moves = state.feed, ((height, RAPID if rate is None else CYCLE, rate, wait) for height, rate, wait in path)
-    record_strokes(state, block, PLANES[state.plane][2], moves, SAME_HEIGHT_MM)
+    frames, normal, modal = state.frames, PLANES[state.plane][2], state.feed
+    for height, rate, wait in path:
+        place = frames.to_program(frames.position)
+        if abs(place[normal] - height) > SAME_HEIGHT_MM:
+            place[normal] = height
+            block.refuse_if(rate is not None and not rate > 0.0, None, "cuts without a feed", "its feed above 0")
+            state.feed = rate
+            record(state, block, RAPID if rate is None else CYCLE, frames.to_control(place), (normal,))
+        if wait:
+            state.recorder.add_dwell(wait)
     state.feed, state.plain.heading = modal, None
 
 

@@ -24,6 +24,7 @@ EQUAL = 1e-9
 KNOWN = "numbers, Q parameters, functions, + - * / ^ ( )"
 Value = float | str  # a truth value is a bool, which is a number
 Lookup = Callable[[str, int], Value]  # the value of a variable, and the column where it stands
+BLANK = re.compile(r"\s*")
 LONGEST_BLOCK, MOST_BRACKETS = 512, 60  # characters (SIEMENS, Fundamentals, "Blocks and block format")
 
 
@@ -94,31 +95,24 @@ class Formula(Scanner):
 
     def part(self, pattern: re.Pattern[str]) -> str:
         """Next text that matches, after blanks; it is then read."""
-        self.blanks()
+        self.take(BLANK)
         return self.take(pattern)
 
     def sign(self, text: str) -> bool:
         """True if `text` comes next, after blanks; it is then read."""
-        self.blanks()
+        self.take(BLANK)
         return self.next(text)
-
-    def blanks(self) -> None:
-        """Read blanks, if any come next."""
-        text, position = self.text, self.position
-        while text[position : position + 1].isspace():
-            position += 1
-        self.position = position
 
     def result(self, tightest: int = 0) -> Value:
         """Value of operands and operators that bind tighter than `tightest`."""
         left = self.operand()
         while True:
-            begin = self.position
+            begin, column = self.position, self.column
             operator = self.part(self.operator)
             if self.ranks.get(operator, 0) <= tightest:
                 self.position = begin
                 return left
-            left = self.operated(operator, left, self.result(self.ranks[operator]), self.column_of(begin))
+            left = self.operated(operator, left, self.result(self.ranks[operator]), column)
 
     def real(self) -> float:
         """A number. Raises `InputError` if the value is none."""
@@ -127,18 +121,10 @@ class Formula(Scanner):
 
     def operand(self) -> Value:
         """A value with its sign: a number, an expression in brackets, or a named value."""
-        self.blanks()
-        begin = self.position
-        if self.next("+"):
-            self.blanks()
-        literal = self.take(self.literal)
-        if literal:
-            return float(literal.replace("EX", "E").replace(",", "."))
-        column = self.column_of(begin)
-        name = self.take(self.name)
-        if name:
-            return self.named(name, column)
-        if self.next("("):
+        self.take(BLANK)
+        column = self.column
+        self.next("+")
+        if self.sign("("):
             value = self.result()
             self.refuse_if(not self.sign(")"), "a bracket that is not closed", ")", column=column)
             return value
@@ -147,7 +133,12 @@ class Formula(Scanner):
             value = -self.number(self.operand(), column)
             self.refuse_if(self.sign("^"), "a sign before ^, which may belong to either", "brackets", column=column)
             return value
-        raise self.fail(f"{self.rest()} is not a value", "a value", column=column)
+        literal = self.take(self.literal)
+        if literal:
+            return float(literal.replace("EX", "E").replace(",", "."))
+        name = self.take(self.name)
+        self.refuse_if(not name, f"{self.rest()} is not a value", "a value", column=column)
+        return self.named(name, column)
 
     def named(self, name: str, column: int) -> Value:
         """Value of a name with what belongs to it: of a function, of a Q parameter."""
@@ -181,6 +172,6 @@ def work_out(text: str, parameter: Callable[[str], float], place: Place) -> floa
     begin = place.column or 1
     scanner = Formula(text, range(begin, begin + len(text) + 1), place, "", lookup=lambda name, _: parameter(name))
     value = scanner.real()
-    scanner.blanks()
+    scanner.take(BLANK)
     scanner.refuse_if(not scanner.done, f"{scanner.rest()} in a formula", KNOWN)
     return value

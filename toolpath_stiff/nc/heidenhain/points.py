@@ -34,7 +34,7 @@ def present(state: State) -> list[float]:
 def outside_contour(state: State, block: CurrentBlock, what: str, also: object = False) -> None:
     """Refuse a statement not allowed in a contour: with compensation, between a corner and its element, after APPR."""
     plain = state.plain
-    waits = state.cutter is not None or plain.held or plain.approach or plain.free or also
+    waits = state.cutter is not None or plain.held is not None or plain.approach is not None or also
     problem = f"{what} inside a contour with compensation or a corner"
     block.refuse_if(waits, None, problem.strip(), "R0 or G40, and a positioning, before it")
 

@@ -25,7 +25,6 @@ from toolpath_stiff.nc.place import Place
 Value = Callable[[Variables], float | None]  # None: an empty variable of Macro B
 
 NUMBER = re.compile(r"\d+\.?\d*|\.\d+", re.ASCII)
-WHOLE = re.compile(r"\d{1,9}(?![\d.])", re.ASCII)
 SIGNS = re.compile(r"[+-]*")
 NAME = re.compile(r"<[^<>]*>")
 FUNCTION = re.compile(r"ABS|ACOS|ASIN|ATAN|COS|EXISTS|EXP|FIX|FUP|LN|POW|RND|ROUND|SIN|SQRT|SQR|TAN")
@@ -79,11 +78,7 @@ class Scanner:
     @property
     def column(self) -> int:
         """Column of the next character."""
-        return self.column_of(self.position)
-
-    def column_of(self, position: int) -> int:
-        """Column of a character, or of the last one."""
-        return self.columns[min(position, len(self.columns) - 1)]
+        return self.columns[min(self.position, len(self.columns) - 1)]
 
     def begins(self, *texts: str) -> bool:
         """True if one of these texts comes next."""
@@ -91,9 +86,8 @@ class Scanner:
 
     def next(self, text: str) -> bool:
         """True if the text comes next; it is then read."""
-        begins = self.text.startswith(text, self.position)
-        if begins:
-            self.position += len(text)
+        begins = self.begins(text)
+        self.position += len(text) * begins
         return begins
 
     def take(self, pattern: re.Pattern[str]) -> str:
@@ -185,10 +179,6 @@ class Scanner:
         self.refuse_if(name and self.family == MACRO_B, problem, "#1 to #999", column=column)
         if name:
             return lambda variables: name
-        literal = WHOLE.match(self.text, self.position)
-        if literal is not None:
-            self.position, known = literal.end(), int(literal[0])
-            return lambda variables: known
         inner = self._unsigned()
 
         def numbered(variables: Variables) -> int:
@@ -203,11 +193,10 @@ class Scanner:
         """Value of operands and operators that bind tighter than `tightest`."""
         left = self.value()
         while True:
-            begin = self.position
+            begin, column = self.position, self.column
             operator = self.take(OPERATOR)
             if not operator:
                 return left
-            column = self.column_of(begin)
             rank = BINDS[self.family].get(operator)
             if rank is None:
                 hint = "name the control with --dialect"

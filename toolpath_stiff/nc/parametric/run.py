@@ -65,7 +65,7 @@ class ParametricRun(ProgramRun):
         block = worked_out(statement, self.variables, self._place(row))
         self._assign(statement.assignments)
         line = statement.block.line if row < self._main_lines else self._line_of_call()
-        return block if block.line == line else replace(block, line=line)
+        return replace(block, line=line)
 
     def _assign(self, assignments: tuple[Assignment, ...]) -> None:
         """Set variables, once all values are known (LinuxCNC, "Numbered Parameters")."""
@@ -286,13 +286,10 @@ class ParametricRun(ProgramRun):
     def _go_on(self, row: int, number: float, column: int) -> int:
         """Block with an N number in the running program. Raises `InputError` for a jump into a loop."""
         to = self._block_numbered(row, "the run goes on at", number, column)
-        opens, ends = self._structure.start, self._structure.end
-        loops = {opens.get(line, line) for line in range(min(row, to), max(row, to) + 1)}
-        entered = [(ends[start], start) for start in loops & ends.keys() if start < to < ends[start]]
-        entered = [(end, start) for end, start in entered if not start < row < end]
-        if entered:
-            problem = f"a jump into the loop that begins in line {self._place(min(entered)[1]).line}"
-            raise self._fail(row, problem, "a block outside of loops", column=column)
+        for start, end in self._structure.end.items():
+            if start < to < end and not start < row < end:
+                problem = f"a jump into the loop that begins in line {self._place(start).line}"
+                raise self._fail(row, problem, "a block outside of loops", column=column)
         return to
 
     def _program_of(self, row: int) -> int:

@@ -16,7 +16,6 @@ from toolpath_stiff.nc.parametric.variables import Variables
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.words import (
     LETTERS,
-    WHOLE_WORDS,
     WORD,
     Block,
     Word,
@@ -32,6 +31,7 @@ _N_WORD = re.compile(r"N\d+(?:\.\d+)?", re.ASCII)
 _LOOP = re.compile(r"(?:DO|END)\d+", re.ASCII)
 LONGEST_BLOCK = 255  # characters without comments and blanks: what LinuxCNC reads
 MOST_VALUES = 30  # of a call
+WHOLE_WORDS = frozenset("GMTL")  # codes and numbers, whose values must be whole
 
 # `#which = value`: works both out; what that gives sets the variable. In a block all are worked out before any is set.
 Assignment = Callable[[Variables], Callable[[], None]]
@@ -215,8 +215,6 @@ def _assignment(scanner: Scanner) -> Assignment:
 
 def worked_out(statement: Statement, variables: Variables, place: Place) -> Block:
     """Block with the values of its words; a word with an empty variable counts as absent (Macro B)."""
-    if not statement.computed:
-        return statement.block
     words = []
     for index, word in enumerate(statement.block.words):
         if index not in statement.computed:
@@ -245,4 +243,4 @@ def _computed_word(word: Word, value: float) -> Word:
     digits = f"{value:#.7g}"
     if "e" not in digits:
         digits = digits.rstrip("0") + "0" * digits.rstrip("0").endswith(".")
-    return Word(word.letter, value, word.column, f"{word.text} ({digits})")
+    return word._replace(value=value, text=f"{word.text} ({digits})")

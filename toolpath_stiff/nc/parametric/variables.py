@@ -9,7 +9,6 @@ work offsets and tool lengths where they are in units that the program states. T
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import lru_cache
 
 from toolpath_stiff.nc.codes.motion import know_height
 from toolpath_stiff.nc.codes.points import know_place
@@ -82,7 +81,7 @@ class Variables:
             return self.common if which.startswith("_") else self.levels[-1]
         if 1 <= which <= LOCALS[self.family]:
             return self.levels[-1]
-        return self.common if _settable(which, self.family) else None
+        return self.common if self._settable(which) else None
 
     def _unset(self, number: int, place: Place) -> float | None:
         if self.family == NGC:
@@ -104,6 +103,14 @@ class Variables:
             problem = f"#{number} is a parameter of the control that is not known here, or in a unit of the machine's"
             raise place.fail(problem, hint="put the number into the program")
         return value
+
+    def _settable(self, number: int) -> bool:
+        """True if a program may set this numbered variable, which is above the local ones."""
+        macro = any(number in numbers for numbers in COMMON)
+        ngc = LOCALS[NGC] < number <= NGC_LAST or number == DEBUG_SWITCH
+        if self.family == EITHER:
+            return (ngc and macro) or number == DEBUG_SWITCH
+        return ngc if self.family == NGC else macro
 
     def set(self, which: Which, value: float | None, place: Place) -> None:
         """Set a variable. Raises `InputError` for one that a program cannot set."""
@@ -188,16 +195,6 @@ class Variables:
             120: float(state.selected),
         }
         return group_values.get(number - 4000)
-
-
-@lru_cache(1024)
-def _settable(number: int, family: str) -> bool:
-    """True if a program may set this numbered variable, which is above the local ones."""
-    macro = any(number in numbers for numbers in COMMON)
-    ngc = LOCALS[NGC] < number <= NGC_LAST or number == DEBUG_SWITCH
-    if family == EITHER:
-        return (ngc and macro) or number == DEBUG_SWITCH
-    return ngc if family == NGC else macro
 
 
 def _axis(axis: int) -> Callable[[Variables], float]:

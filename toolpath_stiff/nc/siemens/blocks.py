@@ -1,12 +1,10 @@
 """A block in Siemens' language: words sorted, then codes in their order, then the move, then the cycles."""
 
-import math
 from collections.abc import Iterable
 
 from toolpath_stiff.nc.codes.code import code_name
 from toolpath_stiff.nc.elements import Element
 from toolpath_stiff.nc.frames import Frames
-from toolpath_stiff.nc.geometry import PLANES
 from toolpath_stiff.nc.run_records import Tally
 from toolpath_stiff.nc.siemens.contours import elements_of
 from toolpath_stiff.nc.siemens.cycles import repeated
@@ -65,8 +63,8 @@ def carry_out(state: State, block: CurrentBlock) -> None:
     if moves(state, block):
         move(state, block)
         repeated(state, block)
-    elif state.motion in ("G0", "G1") and SETS & block.codes.keys() and "MCALL" not in block.codes:
-        repeated(state, block)  # in blocks without a move, too
+    elif state.motion in ("G0", "G1") and not SETS.isdisjoint(block.codes):  # MCALL acts there too
+        repeated(state, block)
     for code in codes:
         if code.rank > STEPS["motion"]:
             code.act(state, block, code.name)
@@ -84,8 +82,6 @@ def draw(state: State, block: CurrentBlock, blocks: Iterable[Block]) -> list[Ele
     """Contour elements that blocks draw, up to the end of their program; the tool of `state` stays where it is."""
     drawn = State(state.name, frames=Frames(Offsets(), None, (0.0,) * 6), dialect=state.dialect, feed=1.0, trace=[])
     drawn.plane, drawn.inch, drawn.motion = state.plane, state.inch, "G1"
-    for axis in PLANES[state.plane][:2]:  # the contour has to say where it begins
-        drawn.frames.position[axis] = math.nan
     for part in blocks:
         current = sort_words(drawn, part, None)
         with current.placing():

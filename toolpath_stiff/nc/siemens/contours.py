@@ -3,8 +3,6 @@
 SIEMENS, SINUMERIK 840D, Programming Guide Cycles (11/2002), "Milling cycles", "Path milling - CYCLE72".
 """
 
-import cmath
-
 from toolpath_stiff.nc.codes.cutter import switch_off
 from toolpath_stiff.nc.compensation import RadiusCompensation
 from toolpath_stiff.nc.elements import Element, direction
@@ -24,9 +22,6 @@ def elements_of(drawn: State, block: CurrentBlock) -> list[Element]:
     contour, trace = list[Element](), drawn.trace or []
     for move in trace[1:]:
         begins, ends = (complex(point[first], point[second]) for point in (move.start, move.end))
-        block.refuse_if(
-            cmath.isnan(begins), None, "CYCLE72 along a contour that does not say where it begins", "X and Y"
-        )
         level = abs(move.end[normal] - move.start[normal]) < LEAST_MM
         block.refuse_if(not level, None, "CYCLE72 along a contour that leaves its plane", "moves in the plane")
         if move.arc is not None:
@@ -48,7 +43,8 @@ def mill_contour(state: State, block: CurrentBlock, code: str) -> None:
     side, leads = SIDES[values["RL"]], list[tuple[complex, complex, complex | None]]()
     apart = abs(side) * (radius + (0.0 if finish else values["FAL"]))
     for name, way, place, element in (("1", -1, contour[0][0], contour[0]), ("2", 1, contour[-1][1], contour[-1])):
-        kind, size, ahead = values[f"AS{name}"], values[f"LP{name}"], direction(element, place)
+        kind, size = (values[f"{word}{name}"] or values[f"{word}1"] for word in ("AS", "LP"))  # out as in, if not given
+        ahead = direction(element, place)
         wrong = kind not in (1.0, 2.0, 3.0) or size <= 0.0 or (kind > STRAIGHT and not side)
         block.refuse_if(wrong, f"AS{name}", "is no lead in the plane with a length (LP1, LP2)", "1; 2, 3 beside a side")
         beside = place + side * apart * 1j * ahead

@@ -59,9 +59,9 @@ class SiemensScanner(Formula):
 
     def index(self) -> str:
         """The index of an array's element as variables' names hold it: "[2]", "[1,3]"; "" if there is none."""
+        column, parts = self.column, list[str]()
         if not self.next("["):
             return ""
-        column, parts = self.column_of(self.position - 1), list[str]()
         while not parts or self.sign(","):
             begin, value = self.position, self.part(NAME)
             if not value or not self.text.startswith(("]", ","), self.position):  # the name of an axis is none

@@ -9,7 +9,8 @@ import math
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 
-from toolpath_stiff.nc.heidenhain.contour import mill, tool_radius
+from toolpath_stiff.nc.geometry import PLANES
+from toolpath_stiff.nc.heidenhain.contour import check_known, mill, tool_radius
 from toolpath_stiff.nc.heidenhain.cycles import Values
 from toolpath_stiff.nc.heidenhain.points import in_plane, outside_contour, present
 from toolpath_stiff.nc.moves import Remark
@@ -49,6 +50,7 @@ def begin(state: State, block: CurrentBlock, code: str) -> tuple[Values, float]:
     corners = any(digit(values["GMODE"], place) > 1 for place in range(6))
     block.refuse_if(corners, "GMODE", "measures from a corner, or mills what another tool has left", "11100")
     outside_contour(state, block, code, state.plain.side)
+    check_known(state, block, {PLANES[state.plane][2]: 0.0}, rapid=True)
     radius = tool_radius(state, block, code) / state.plain.scale
     block.refuse_if(not radius, None, f"{code} with a tool of no radius", "D1 before it, and its diameter")
     if all(remark.text != OUR_WAY for remark in state.warnings):
@@ -58,8 +60,8 @@ def begin(state: State, block: CurrentBlock, code: str) -> tuple[Values, float]:
 
 def approached(state: State, values: Values, start: complex) -> list[Cut]:
     """Rapids at the retraction plane to above the start of a path, and down to the safety distance."""
-    known = [] if state.plain.unknown else [(in_plane(state, present(state)), "RTP")]
-    return [(place, values[height], None, None, 0) for place, height in (*known, (start, "RTP"), (start, "TOP"))]
+    places = ((in_plane(state, present(state)), "RTP"), (start, "RTP"), (start, "TOP"))
+    return [(place, values[height], None, None, 0) for place, height in places]
 
 
 def mill_area(state: State, block: CurrentBlock, code: str) -> None:

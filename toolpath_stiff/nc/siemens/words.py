@@ -7,7 +7,7 @@ absolute and incremental dimensions"; Job Planning, "Definition of user variable
 import re
 from collections.abc import Callable
 
-from toolpath_stiff.nc.heidenhain.expressions import Value
+from toolpath_stiff.nc.heidenhain.expressions import BLANK, Value
 from toolpath_stiff.nc.parametric.expressions import Value as Number
 from toolpath_stiff.nc.parametric.statements import Steering
 from toolpath_stiff.nc.siemens.cycles import SIGNATURES, TEXTS
@@ -38,7 +38,7 @@ Define = Callable[[str, Value, int, str], None]  # sets a variable: name, value,
 
 def steering_of(scanner: SiemensScanner, evaluate: Callable[[int], Number]) -> Steering | None:
     """The effect of a block on the flow; None if it only acts. `evaluate`: the value of the expression at a place."""
-    scanner.blanks()
+    scanner.take(BLANK)
     begin, column, plain = scanner.position, scanner.column, PLAIN.match(scanner.text, scanner.position)
     name = scanner.take(NAME)
     if not name or (plain and name[0] != "L") or name in ("DEF", "PROC"):
@@ -51,7 +51,7 @@ def steering_of(scanner: SiemensScanner, evaluate: Callable[[int], Number]) -> S
         return Steering(name, "", name, column, values)
     if name in ("REPEAT", "REPEATB"):
         return Steering("SECTION" if SECTION.match(scanner.text, begin) else "DO UNTIL", "", name, column)
-    scanner.blanks()
+    scanner.take(BLANK)
     a_word = name in TABLE or name in REFUSED or name in ADDRESSES or scanner.begins("[", "=")
     return None if a_word else Steering("CALL", name, name, column)
 
@@ -60,7 +60,7 @@ def read_words(scanner: SiemensScanner, define: Define) -> list[Word]:
     """The words of a block; sets variables along the way. Raises `InputError` with line and column."""
     words = list[Word]()
     while True:
-        scanner.blanks()
+        scanner.take(BLANK)
         if scanner.done:
             return words
         begin, column, plain = scanner.position, scanner.column, PLAIN.match(scanner.text, scanner.position)
@@ -136,7 +136,7 @@ def _offset(scanner: SiemensScanner, index: str, column: int) -> list[Word]:
 
 def _named(scanner: SiemensScanner, name: str, column: int) -> list[Word]:
     """A word without a number, and the parameters in its brackets if these are known by name."""
-    scanner.blanks()
+    scanner.take(BLANK)
     words = [Word(name, 0.0, column, name)]
     if name in SIGNATURES and scanner.begins("("):
         names, values = SIGNATURES[name].split(), scanner.arguments()
