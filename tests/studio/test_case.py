@@ -342,7 +342,10 @@ def from_elsewhere(tmp_path, monkeypatch):
 
 def test_a_moved_case_opens_once_this_user_agrees_to_its_code(from_elsewhere):
     folder, marker = from_elsewhere
-    for trust, said in (([], "you have not agreed to run it"), (["effects/other.py"], "no file of own effects")):
+    for trust, said in (
+        ([], "you have not agreed to run it"),
+        (["effects/other.py"], "is not an effect file of this case"),
+    ):
         with pytest.raises(tps.InputError, match=said):
             tps.Case.open(folder, trust=trust)
     assert not marker.exists()

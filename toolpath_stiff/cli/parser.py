@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 import toolpath_stiff as tps
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.options import PARAMETERS, SWITCHES, Argument, Option, arguments_of
-from toolpath_stiff.report.folder import skip_docstrings
+from toolpath_stiff.report.folder import quicken_pictures
 
 # argparse takes "-10,0,800" or "-300:300" for an option; this matches every value that begins like a negative number.
 NEGATIVE_VALUE = re.compile(r"^-(\d|\.\d|inf|nan)")
@@ -59,7 +59,7 @@ class Command:
             return 0
         args = self.read(title, words)
         if not getattr(args, NO_PLOTS.name, True):
-            skip_docstrings()
+            quicken_pictures()
         return self.run(args, **{name: getattr(args, name) for name in arguments_of(self.run)})
 
     def parser(self, title: str) -> Parser:

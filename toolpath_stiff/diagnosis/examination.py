@@ -15,16 +15,15 @@ from toolpath_stiff.documents import DIGITS, Document, json_number
 from toolpath_stiff.hints import Asked
 from toolpath_stiff.inference.candidates import Component
 from toolpath_stiff.inference.drawn import Drawn
-from toolpath_stiff.inference.entries import entries, shortened
 from toolpath_stiff.inference.errors import AS_GIVEN, error_figures
 from toolpath_stiff.inference.evidence import Fit
 from toolpath_stiff.inference.hypotheses import Family, averaged_interval
-from toolpath_stiff.inference.judgement import ADEQUATE, FALSE_ALARM, NONE, OUTSIDE, Judgement
+from toolpath_stiff.inference.judgement import ADEQUATE, FALSE_ALARM, NONE, OUTSIDE, Judgement, shortened
 from toolpath_stiff.inference.left_out import HeldOut, gain_in_standard_errors
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.inference.nuisances import fitted_nuisances
 from toolpath_stiff.inference.prediction import Predictor
-from toolpath_stiff.inference.rivals import lowers_error
+from toolpath_stiff.inference.rivals import entries, lowers_error
 from toolpath_stiff.inference.slips import SuspectEntry
 from toolpath_stiff.inference.unexcluded import Unexcluded
 from toolpath_stiff.machine.model import Hexapod
@@ -207,9 +206,7 @@ class Diagnosis(FolderResult):
         most = 1 if self.verdict in NAMING else None
         turns = zip_longest(*(judgement.explanations[:most] for judgement in self.judgements.values()))
         standing = tuple(dict.fromkeys(name for turn in turns for name in turn if name))
-        return (
-            standing if len(self.judgements) == 1 else shortened(self.main.problem, self._standing_fits, standing, NONE)
-        )
+        return standing if len(self.judgements) == 1 else shortened(self.main.problem, self._standing_fits, standing)
 
     @property
     def plausible(self) -> list[str]:

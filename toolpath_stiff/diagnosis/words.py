@@ -146,9 +146,7 @@ def _rivals(diagnosis: Diagnosis) -> str:
 
 
 def _alike(entry: Sequence[str]) -> str:
-    several = {name for name in entry if " + " in name and {*name.split(" + ")} <= {*entry}}
-    others = [name for name in entry[1:] if name not in several]
-    return f" - or, alike at these poses, {joined(others)}{', or several of these' * bool(several)}" if others else ""
+    return f" - or, alike at these poses, {joined(entry[1:])}" if entry[1:] else ""
 
 
 def _most_left(diagnosis: Diagnosis) -> str:

@@ -10,15 +10,13 @@ from toolpath_stiff.inference.hypotheses import Family
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.inference.nuisances import mean_left_by_nuisances
 from toolpath_stiff.inference.prequential import votes
-from toolpath_stiff.inference.rivals import rivals_of_law
+from toolpath_stiff.inference.rivals import ONE_BODY, SERIES, rivals_of_law
 from toolpath_stiff.inference.unexcluded import rooms
-from toolpath_stiff.inference.votes import SMALL, Votes, outvoted
-from toolpath_stiff.stiffness.contract import Effect
+from toolpath_stiff.inference.votes import Votes, outvoted
 
 # Share of the stiffness that `adequate` may leave along a path; assumed: a third of what cutting forces are known to.
 LEFT = 0.03
 ONE_SIDED = 1.645  # normal quantile of 95 %
-NEAR = 0.5  # share of the law's gain that a rival must have when linearised; assumed: no model's own gain is twice that
 
 
 def may_leave(problem: Problem, noise: Noise, families: Sequence[Family], base: Fit) -> float:
@@ -52,18 +50,17 @@ def is_small(problem: Problem, base: Fit, explanations: Sequence[Fit]) -> bool:
     return most <= LEFT
 
 
-def instead_of_law(problem: Problem, fit: Fit, effects: Sequence[Effect]) -> tuple[dict[str, Fit], Votes]:
+def instead_of_law(problem: Problem, fit: Fit) -> tuple[dict[str, Fit], Votes]:
     """Explanations beside the file's strut law that hold as well as one with a law that had to move; all their votes.
 
-    Each with one of the `effects` more, the closest first. None where the law has moved the stiffness by less than an
-    adequate model may leave along a path, beyond chance.
+    The closest first. None where the law has moved the stiffness by less than an adequate model may leave along a path,
+    beyond chance.
     """
     if moved_by_law(problem, fit) <= LEFT:
         return {}, {}
     given = with_given_law(problem, fit)
     if not outvoted(votes(problem, fit, {fit.name: given})[fit.name]):
         return {}, {}
-    least = NEAR * (fit.log_posterior - given.log_posterior) - SMALL
-    rivals = {rival.name: rival for rival in rivals_of_law(problem, given, effects, least).values()}
+    rivals = {rival.name: rival for rival in rivals_of_law(problem, given, (SERIES, *ONE_BODY)).values()}
     ballots = votes(problem, fit, rivals)
     return {name: rivals[name] for name in ballots if not outvoted(ballots[name])}, ballots

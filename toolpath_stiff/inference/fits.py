@@ -174,7 +174,7 @@ def add_effect(problem: Problem, before: Fit, candidates: Sequence[Candidate], l
     tried = [fit for candidate in candidates for fit in _from_starts(problem, before, candidate, law_free)]
     least = max(fit.log_posterior for fit in tried) - BEHIND
     likely = [settled(problem, fit) for fit in tried if fit.log_posterior >= least]
-    return without_zeros(max(likely, key=lambda fit: fit.log_posterior))
+    return _without_zeros(max(likely, key=lambda fit: fit.log_posterior))
 
 
 def _from_starts(problem: Problem, before: Fit, candidate: Candidate, law_free: bool) -> Iterator[Fit]:
@@ -211,7 +211,7 @@ def settled(problem: Problem, fit: Fit) -> Fit:
     return fit
 
 
-def without_zeros(fit: Fit) -> Fit:
+def _without_zeros(fit: Fit) -> Fit:
     """Fit whose sizes at zero no longer count as free."""
     sizes = np.concatenate([np.zeros(0), *fit.sizes])
     kept = [k for k, index in enumerate(fit.free) if sizes[index] != 0.0]
@@ -235,7 +235,7 @@ def without_zeros(fit: Fit) -> Fit:
 def with_given_law(problem: Problem, fit: Fit) -> Fit:
     """Fit of the same effects beside the strut law of the machine file."""
     given = fit_effects(problem, fit.candidates, fit.sizes, fit.free, np.zeros(2), fit.scatter, law_free=False)
-    return without_zeros(settled(problem, given))
+    return _without_zeros(settled(problem, given))
 
 
 def baseline(problem: Problem) -> tuple[Fit, Fit]:

@@ -36,7 +36,6 @@ from toolpath_stiff.inference.adequacy import LEFT, instead_of_law, is_small, ma
 from toolpath_stiff.inference.discrepancies import discrepancy_forms
 from toolpath_stiff.inference.doubts import noise_doubt, question
 from toolpath_stiff.inference.drawn import Drawn, drawn
-from toolpath_stiff.inference.entries import entries, exchanged, shortened
 from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.fair_forms import fair_rivals
 from toolpath_stiff.inference.fits import refine
@@ -46,7 +45,7 @@ from toolpath_stiff.inference.left_out import held_out
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.inference.nuisances import TAKEN_UP, not_told
 from toolpath_stiff.inference.prequential import carried, votes
-from toolpath_stiff.inference.rivals import lowers_error, rivals_of
+from toolpath_stiff.inference.rivals import entries, lowers_error, rivals_of
 from toolpath_stiff.inference.several import search_pairs
 from toolpath_stiff.inference.unexcluded import Unexcluded, not_excluded
 from toolpath_stiff.inference.votes import Votes, closest, outvoted
@@ -58,6 +57,7 @@ OUTSIDE = "outside the catalogue"
 PRIOR_NONE, PRIOR_SINGLES, PRIOR_PAIRS, PRIOR_OUTSIDE = 0.30, 0.50, 0.10, 0.10
 FALSE_ALARM = 0.05  # false alarms of the base model's gate
 ADEQUATE = 0.005  # below this probability an explanation does not explain the data
+MOST_OPEN = 3  # most entries that an ambiguous verdict lists; the document has all votes
 NAMED = 0.90  # probability from which a single name is the answer
 HELD = 0.95  # probability that the plausible set adds up to where it is not a single name
 STANDS = 0.05  # probability from which something outside the catalogue, or another pair, is not ruled out
@@ -420,23 +420,21 @@ def put_to_vote(
             ballots = closest(ballots, votes(problem, fits[top], fair_rivals(problem, fits[top], base)))
             lost = {name for name, differences in ballots.items() if outvoted(differences)}
             open_rivals = [name for name in ballots if name not in lost]
-            open_pairs = {*open_rivals} - {*gates.fits}
-            gates.fits |= {pair.name: refine(problem, pair) for pair in gates.tried if pair.name in open_pairs}
+            open_pairs = [pair for pair in gates.tried if pair.name in open_rivals and pair.name not in gates.fits]
+            gates.fits |= {pair.name: refine(problem, pair) for pair in open_pairs}
+            fits |= gates.fits
             likely = standing
             verdict, standing = "ambiguous" if open_rivals else verdict, [top, *standing, *open_rivals]
             if verdict == "ambiguous" and gates.none_stands and is_small(problem, base, [fits[n] for n in likely]):
                 standing.append(NONE)
     else:
         return verdict, explanations, {}
-    instead, of_law = instead_of_law(problem, fits[likely[0]], [family.effect for family in candidates.hidden])
+    instead, of_law = instead_of_law(problem, fits[likely[0]])
+    gates.fits |= instead
     if verdict == "adequate" and len(standing) == 1 and not instead:
         return verdict, explanations, {}
-    ballots, settled = closest(ballots, of_law), verdict == "identified" and not instead
-    seconds = {} if settled else _with_a_second(problem, noise, candidates, gates, standing[0])
-    gates.fits |= instead
-    fits |= gates.fits
-    first, *others = dict.fromkeys([*standing, *seconds, *instead])
-    weights = {**probability, **seconds}
+    ballots = closest(ballots, of_law)
+    first, *others = dict.fromkeys([*standing, *instead])
 
     def behind(name: str) -> tuple[bool, float]:
         """Sort key: votes; without votes (part of the first) the odds; beside a model that passes, chance alone."""
@@ -444,24 +442,14 @@ def put_to_vote(
             return name in lost, float(ballots[name].sum())
         if verdict == "adequate":
             return False, -np.inf if name in TAKEN_UP else np.inf
-        return False, float(np.log(max(weights.get(first, 0.0), 1e-300) / max(weights.get(name, 0.0), 1e-300)))
+        return False, float(np.log(max(probability.get(first, 0.0), 1e-300) / max(probability.get(name, 0.0), 1e-300)))
 
     order = [first, *sorted(others, key=behind)]
-    if settled:
-        return verdict, tuple(order), ballots
-    listed, singles = shortened(problem, fits, order, NONE), [family.name for family, _ in candidates.offered]
-    alike = exchanged(problem, fits, singles, entries(problem, fits, listed))
-    return "ambiguous", shortened(problem, fits, [*listed, *alike], NONE), ballots
-
-
-def _with_a_second(problem: Problem, noise: Noise, candidates: Candidates, gates: Gates, name: str) -> dict[str, float]:
-    """Pairs of a single effect and another that are not ruled out beside it, and itself -> probability among them."""
-    pairs = [pair for pair in gates.tried if pair.possible and name in gates.singles and name in pair.names]
-    weights = _posterior(problem, noise, candidates, False, (name,), pairs) if pairs else {}
-    likely = {pair: weight for pair, weight in weights.items() if weight >= STANDS * weights[name]}
-    refined = {*likely} - {*gates.fits}
-    gates.fits |= {pair.name: refine(problem, pair) for pair in pairs if pair.name in refined}
-    return likely
+    return (
+        "ambiguous" if instead or verdict == "adequate" else verdict,
+        shortened(problem, fits | instead, order),
+        ballots,
+    )
 
 
 def _votes_of_few(
@@ -473,6 +461,14 @@ def _votes_of_few(
         name: gain + np.log(max(own / _prior(families, max(len(rivals[name].names), 1)), 1.0)) / len(gain)
         for name, gain in votes(problem, fit, rivals).items()
     }
+
+
+def shortened(problem: Problem, fits: Mapping[str, Fit], names: Sequence[str]) -> tuple[str, ...]:
+    """Explanations in the first `MOST_OPEN` entries; the model alone stays in any case."""
+    groups = entries(problem, fits, tuple(dict.fromkeys(names)))
+    kept = groups[:MOST_OPEN]
+    kept[-1:] = [group for group in groups[MOST_OPEN:] if NONE in group] or kept[-1:]
+    return tuple(name for group in kept for name in group)
 
 
 def unexcluded(judgement: Judgement) -> tuple[Unexcluded, ...]:

@@ -9,9 +9,14 @@ from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.fits import add_effect
 from toolpath_stiff.inference.hypotheses import tables_of
 from toolpath_stiff.inference.left_out import HeldOut
+from toolpath_stiff.inference.votes import SMALL
 from toolpath_stiff.stiffness.contract import SETUP, Effect
 
 INSTRUMENT = "instrument"
+# Effects that carry the tip's whole force to the floor as one body on springs (`contract.body_on_springs`).
+ONE_BODY = ("table_compliance", "frame_sway")
+SERIES = "joint_compliance"  # the effect that a wrong strut law may stand for, in series with every strut
+TWINS = 0.05  # votes below which two explanations are the same to these readings
 UNSEEN = 5e-5  # of a mean error: half of the last digit that is printed
 
 
@@ -40,27 +45,57 @@ def rivals_of(fit: Fit, fits: Mapping[str, Fit]) -> dict[str, Fit]:
     return {name: other for name, other in fits.items() if rival(other)}
 
 
-def rivals_of_law(
-    problem: Problem, given: Fit, effects: Sequence[Effect] | None = None, least: float = 0.0
-) -> dict[str, Fit]:
-    """Effects, those of instruments unless they are named, each fitted beside the file's strut law, by name.
+def rivals_of_law(problem: Problem, given: Fit, machine: Sequence[str] = ()) -> dict[str, Fit]:
+    """Instrument effects, and the `machine` effects named, each fitted beside the file's strut law, by name.
 
     What a refitted law may stand for: under one load a law that is softer by a share is at the tip the same as a load
-    cell that reads too little by it. `least`: log likelihood that they have to gain, linearised.
+    cell that reads too little by it.
     """
-    if effects is None:
-        effects = [effect for effect in testable_effects(problem.predictor)[0] if effect.link == INSTRUMENT]
-    tables = {effect.name: tables_of(problem, effect) for effect in effects if effect.name not in given.names}
-    gains = {name: [_gain(problem, given, table) for table in some] for name, some in tables.items() if some}
-    likely = {name: tables[name][int(np.argmax(some))].candidate for name, some in gains.items() if max(some) >= least}
+    effects = [e for e in testable_effects(problem.predictor)[0] if e.link == INSTRUMENT or e.name in machine]
+    tables = {e.name: tables_of(problem, e) for e in effects if e.name not in given.names}
+    gains = {name: [_gain(problem, given, table) for table in some] for name, some in tables.items()}
+    likely = {name: some[int(np.argmax(gains[name]))].candidate for name, some in tables.items() if some}
     return {name: add_effect(problem, given, [candidate], law_free=False) for name, candidate in likely.items()}
 
 
 def _gain(problem: Problem, fit: Fit, table: CandidateTable) -> float:
-    """Gain in log likelihood by a small size of a candidate beside a fit, linearised."""
+    """Gain in twice the log likelihood by a small size of a candidate beside a fit, linearised."""
     columns = -table.columns.T / problem.base_compliance
     pull = fit.scatter.precision.times(columns)
-    return 0.5 * float(pull @ fit.residual @ np.linalg.pinv(pull @ columns.T, hermitian=True) @ pull @ fit.residual)
+    return float(pull @ fit.residual @ np.linalg.pinv(pull @ columns.T, hermitian=True) @ pull @ fit.residual)
+
+
+def place_of(effect: Effect) -> str:
+    """Place where a user would look for an effect: its link; of instruments and geometry, the effect itself."""
+    if effect.name in ONE_BODY:
+        return "body on springs"
+    return effect.name if effect.link in (INSTRUMENT, "geometry") else part_of(effect)
+
+
+def entries(problem: Problem, fits: Mapping[str, Fit], names: Sequence[str]) -> list[tuple[str, ...]]:
+    """Explanations grouped where they sit at the same places and votes on these readings could not tell them apart.
+
+    In the order of `names`; one that is in no `fits` stands alone. The votes between two that differ by d in whitened
+    residuals come to d^2 / 2 where one of them is true. A refitted law sits where `SERIES` does beside the file's.
+    """
+    groups: list[tuple[str, ...]] = []
+    for name in names:
+        for k, (first, *_) in enumerate(groups):
+            if name in fits and first in fits and _alike(problem, fits[name], fits[first]):
+                groups[k] = (*groups[k], name)
+                break
+        else:
+            groups.append((name,))
+    return groups
+
+
+def _alike(problem: Problem, fit: Fit, other: Fit) -> bool:
+    def places(fit: Fit) -> list[str]:
+        return sorted(place_of(c.effect) for c in fit.candidates if fit.law_free or c.name != SERIES)
+
+    apart = float(problem.scatter.precision.squares(fit.residual - other.residual))
+    twins = TWINS if fit.candidates and other.candidates else 0.0
+    return 0.5 * apart <= (SMALL if places(fit) == places(other) else twins)
 
 
 def lowers_error(before: HeldOut, after: HeldOut) -> bool:

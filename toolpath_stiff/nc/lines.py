@@ -2,7 +2,10 @@
 
 import codecs
 import re
+from collections.abc import Iterator, Sequence
+from itertools import chain
 from pathlib import Path
+from typing import Any
 
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.files import check_regular
@@ -11,6 +14,7 @@ from toolpath_stiff.nc.place import Place
 # Caps. Longer is no NC program, and what reads a line takes time by the square of its length.
 LARGEST_FILE = 512 << 20  # bytes: some ten million lines
 LONGEST_LINE = 10_000  # characters, comments included
+PORTION = 100  # lines
 # Control characters that no text file holds. It may hold tab, line feed, form feed, carriage return, and the old
 # end-of-file mark of CP/M and DOS (0x1A), which some posts still append.
 BINARY = re.compile("[\x00-\x08\x0b\x0e-\x19\x1b-\x1f\x7f]")
@@ -72,6 +76,35 @@ def split_lines(text: str, name: str) -> tuple[str, ...]:
         row = next(row for row, line in enumerate(lines) if len(line) > LONGEST_LINE)
         raise Place(name, row + 1).fail(f"a line of {len(lines[row])} characters", f"lines of at most {LONGEST_LINE}")
     return tuple(lines)
+
+
+class TextLines(Sequence[str]):
+    """Lines kept as texts of `PORTION` lines: those of a long program then take a third of the memory.
+
+    Examples
+    --------
+    >>> lines = TextLines(("G21", "", "M30"))
+    >>> len(lines), lines[-1], lines[:2], [*lines]
+    (3, 'M30', ['G21', ''], ['G21', '', 'M30'])
+    """
+
+    def __init__(self, lines: Sequence[str]) -> None:
+        self._count = len(lines)
+        self._parts = ["\n".join(lines[first : first + PORTION]) for first in range(0, len(lines), PORTION)]
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __getitem__(self, index: Any) -> Any:
+        rows = range(self._count)[index]
+        if isinstance(rows, int):
+            return self._parts[rows // PORTION].split("\n")[rows % PORTION]
+        part = slice(min(rows, default=0) // PORTION, max(rows, default=-1) // PORTION + 1)
+        lines, first = "\n".join(self._parts[part]).split("\n"), part.start * PORTION
+        return [lines[row - first] for row in rows]
+
+    def __iter__(self) -> Iterator[str]:
+        return chain.from_iterable(part.split("\n") for part in self._parts)
 
 
 def _any_binary(text: str) -> bool:

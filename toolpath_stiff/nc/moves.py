@@ -4,6 +4,7 @@ This is what the reader hands on: geometry with its line, feed and tool; no mach
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from itertools import chain
 from operator import attrgetter
@@ -206,7 +207,7 @@ class ReadProgram:
 
     name: str
     path: str
-    source: tuple[str, ...]
+    source: Sequence[str]
     moves: Moves
     origin: Pose = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     origin_source: str = "default"
@@ -334,10 +335,16 @@ class Recorder:
             column.resize((n, *column.shape[1:]), refcheck=False)
             if not column.any():  # pages never written to take no memory
                 columns[name] = np.zeros(column.shape, column.dtype)
+        start, end = columns["start"], columns["end"]
+        if n and np.array_equal(start[1:].view(np.int64), end[:-1].view(np.int64)):  # without gaps: each point once
+            points = np.concatenate([start[:1], end])
+            columns |= {"start": points[:-1], "end": points[1:]}
         return Moves(**columns | {name: held_once(columns[name]) for name in HELD})
 
     def _recent_in_si(self) -> Moves:
-        rows = dict(zip(ENTRIES, zip(*map(attrgetter(*ENTRIES), self.recent), strict=True), strict=False))
+        rows: dict[str, Sequence[Any]] = dict(
+            zip(ENTRIES, zip(*map(attrgetter(*ENTRIES), self.recent), strict=True), strict=False)
+        )
         arcs = [arc or NO_ARC for arc in rows.pop("arc", ())]
         for name in ("sweep", "center", "normal"):
             rows[f"arc_{name}"] = [getattr(arc, name) for arc in arcs]

@@ -7,6 +7,7 @@ from typing import Any
 
 from toolpath_stiff.nc.controller import UNKNOWN_CONTROL, Controller
 from toolpath_stiff.nc.frames import Frames
+from toolpath_stiff.nc.lines import TextLines
 from toolpath_stiff.nc.moves import ReadProgram, Remark
 from toolpath_stiff.nc.state import Record, State
 from toolpath_stiff.nc.tables import Offsets
@@ -75,6 +76,6 @@ class Request:
     def program(self, record: Record, **more: Any) -> ReadProgram:
         """The program made of a reading's record; `more`: other attributes of `ReadProgram`."""
         return ReadProgram(
-            self.name, self.path, self.lines, record.recorder.moves(), unsupported=tuple(record.unsupported),
+            self.name, self.path, TextLines(self.lines), record.recorder.moves(), unsupported=tuple(record.unsupported),
             tools=tuple(record.used_tools.values()), **more,
         )  # fmt: skip

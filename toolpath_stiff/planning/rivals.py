@@ -7,7 +7,6 @@ import numpy as np
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.candidates import Candidate, Component
-from toolpath_stiff.inference.entries import at_tip
 from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED, error_figures
 from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem
 from toolpath_stiff.inference.fits import baseline, fit_effects, refine
@@ -29,19 +28,15 @@ def rival_of_fit(name: str, fit: Fit, weight: float = 1.0) -> Rival:
 def rivals_of(judgement: Judgement) -> list[Rival]:
     """Explanations that a diagnosis leaves standing, with their probabilities, none below `LEAST_WEIGHT`.
 
-    Those that votes leave open have none of their own or a small one. Of pairs that no reading of the tip tells apart,
-    one. Where no two stand, the likely others beside it,
+    Those that votes leave open have none of their own or a small one. Where no two stand, the likely others beside it,
     at least the likeliest: what a plan would confirm the answer against.
     """
     likely = [name for name, weight in judgement.likely if weight >= LEAST_WEIGHT]
     names = judgement.explanations if len(judgement.explanations) > 1 else (*judgement.explanations, *likely)
-    rivals, pairs = dict[str, Rival](), set[tuple[str, ...]]()
+    rivals = dict[str, Rival]()
     for k, name in enumerate(dict.fromkeys([*names, NONE, *(family.name for family in judgement.families)])):
         if k >= len(names) and len(rivals) >= 2:
             break
-        if " + " in name and at_tip(name) in pairs:
-            continue
-        pairs.add(at_tip(name))
         if fit := _fit_of(judgement, name):
             rivals[name] = rival_of_fit(name, fit, max(judgement.probability.get(name, 0.0), LEAST_WEIGHT))
     return sorted(rivals.values(), key=lambda rival: (-rival.weight, rival.name))

@@ -130,7 +130,7 @@ def _data(analysis: Analysis, rows: IntArray) -> Document:
     return {
         "machine": plain(analysis.machine.name),
         "scene": machine_scene(analysis.machine, np.concatenate([samples.position, samples.abc], axis=1)),
-        "source": list(analysis.program.source),
+        "source": analysis.program.source,
         "count": len(rows),
         "samples": len(analysis.samples),
         "motions": MOTION_NAMES,

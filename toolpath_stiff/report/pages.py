@@ -202,9 +202,9 @@ def json_pieces(value: Any) -> Iterator[str]:
             yield from json_pieces(entry)
             before = ","
         yield "}"
-    elif isinstance(value, list) and len(value) > LONG_LIST:
+    elif isinstance(value, Sequence) and not isinstance(value, str | tuple):
         before = "["
-        for start in range(0, len(value), LONG_LIST):
+        for start in range(0, max(len(value), 1), LONG_LIST):
             yield before + _json(value[start : start + LONG_LIST])[1:-1]
             before = ","
         yield "]"

@@ -1,7 +1,7 @@
 """Family of a parametric program: RS274/NGC or Macro B, by its dialect or by its signs."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 from toolpath_stiff.nc.controller import Dialect
 from toolpath_stiff.nc.place import Place
@@ -22,7 +22,7 @@ _COMMENT = re.compile(r"\([^)]*\)|;.*")
 _SUSPECT = re.compile(r"[#\[oOiIwWdD]|[gG]\s*0*6")
 
 
-def line_with_variables(lines: tuple[str, ...]) -> int:
+def line_with_variables(lines: Iterable[str]) -> int:
     """First line, from 1, with a variable, an expression, or flow control; 0 if there is none.
 
     Examples
@@ -33,7 +33,7 @@ def line_with_variables(lines: tuple[str, ...]) -> int:
     return next((number for number, text in _bare(lines) if any(sign.search(text) for sign in _SIGNS)), 0)
 
 
-def _bare(lines: tuple[str, ...]) -> Iterator[tuple[int, str]]:
+def _bare(lines: Iterable[str]) -> Iterator[tuple[int, str]]:
     """Number and text of lines that may matter, without comments and blanks, in upper case."""
     for number, line in enumerate(lines, 1):
         if _SUSPECT.search(line):
