@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
+from tests.conftest import as_written
 from tests.stiffness.cases import nist
 from tests.updating.cases import active, campaign, make_problem, predictor_for, simple_noise
 from toolpath_stiff.inference.candidates import candidates_of
@@ -31,7 +32,7 @@ def families_of(problem, names=NAMES):
 
 def problem_with(*effects, noise=1e-3, seed=3):
     """Readings of the nist machine with these effects, and little scatter."""
-    rng = np.random.default_rng(seed)
+    rng = as_written(seed)
     logs = predictor_for(DATA).log_stiffness(effects=effects)
     problem, _ = make_problem(nist(), DATA, simple_noise(len(DATA), noise))
     problem.observed = logs + noise * rng.standard_normal(len(DATA))

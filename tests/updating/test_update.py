@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from tests.conftest import as_written
 from tests.stiffness.cases import nist
 from tests.updating.cases import active, campaign, table_1
 from toolpath_stiff.correction.additions import parse_addition
@@ -44,10 +45,10 @@ class HeadCompliance(Effect):
 '''
 
 
-def readings(*effects, law=(0.0, 0.0), scatter=0.02, seed=1):
+def readings(*effects, law=(0.0, 0.0), scatter=0.02, seed=1, draw=np.random.default_rng):
     """The paper's 42 readings of a machine with these effects."""
     logs = MODEL.log_stiffness(law, effects)
-    noise = scatter * np.random.default_rng(seed).standard_normal(len(logs))
+    noise = scatter * draw(seed).standard_normal(len(logs))
     return replace(PAPER, stiffness=np.exp(logs + noise), sd=scatter * np.exp(logs))
 
 
@@ -66,7 +67,7 @@ def two():
 
 @pytest.fixture(scope="module")
 def weak():
-    data = readings(active("weak_strut", {"strut": 3}, factor=0.75))
+    data = readings(active("weak_strut", {"strut": 3}, factor=0.75), draw=as_written)
     return updated(data, "weak_strut", strut_law=True)
 
 

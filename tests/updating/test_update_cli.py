@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import toolpath_stiff as tps
+from tests.conftest import as_written
 from tests.stiffness.cases import nist
 from tests.updating.cases import active, table_1
 from toolpath_stiff.cli.main import main
@@ -24,7 +25,7 @@ def weak_csv(tmp_path_factory):
     """The paper's points on a machine whose third strut is a quarter softer; readings scatter by 2 %."""
     data = table_1()
     logs = Predictor(nist(), data).log_stiffness((0.0, 0.0), [active("weak_strut", {"strut": 3}, factor=0.75)])
-    scattered = np.exp(logs + 0.02 * np.random.default_rng(1).standard_normal(len(logs))) / 1e3
+    scattered = np.exp(logs + 0.02 * as_written(1).standard_normal(len(logs))) / 1e3
     rows = ["point,x_mm,y_mm,z_mm,direction,force_N,stiffness_N_per_mm,sd_N_per_mm"]
     for i, value in enumerate(scattered):
         x, y, z = 1e3 * data.position[i]
