@@ -304,7 +304,7 @@ def test_shop_units_at_the_door():
         (lambda: tps.place(tps.Program.from_text(SLOT), "nist", x_mm=(5, -5)), "lower bound first"),
         (lambda: tps.place(tps.Program.from_text(SLOT), "nist", decimals=3), "without --write"),
         (lambda: tps.place(tps.Program.from_text(SLOT), "nist", objective="best"), "--objective best"),
-        (lambda: tps.compare("nist-table1", "nist", noise_percent=80), "noise 80 %"),
+        (lambda: tps.compare("nist-table1", "nist", noise_percent=80), "--noise 80; expected one or two percentages"),
         (lambda: tps.compare("nist-table1", "nist", seed=-1), "seed -1"),
         (lambda: tps.compare("nowhere.csv", "nist"), "nowhere.csv"),
         (lambda: tps.plan(machine="nist", minutes={"lunch": 30}), "lunch"),

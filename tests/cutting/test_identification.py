@@ -162,7 +162,7 @@ BROKEN = {
     "a depth below nothing": ({"depth": "=-3"}, {}, "depth_mm = -3"),
     "no number": ({"depth": "=deep"}, {}, "depth_mm = 'deep'"),
     "nothing but zeros": ({"fx": "=0", "fy": "=0", "fz": "=0"}, {}, "do not tell the coefficients apart"),
-    "no forces of this world": ({"fy": "=1e300"}, {}, r"slot60.csv:2: fy_N = 1e300; expected at most 1e\+06 N"),
+    "no forces of this world": ({"fy": "=1e300"}, {}, r"slot60.csv:2: fy_N = 1e300; expected at most 1e\\+06 N"),
     "a speed far off": ({"spindle_rpm": "=60"}, {}, "whole turns of the full slot"),
 }
 

@@ -390,6 +390,10 @@ def test_programs_that_are_called(tmp_path):
     control = Controller(subprograms=str(tmp_path))
     check_path(read("Q5 = 2\nLBL 1\nCALL PGM SUB.H\nCALL LBL 1 REP 1\nL X+9", controller=control),
                "F 2 0 0; F 2 1 0; F 2 2 0; F 4 2 0; F 4 3 0; F 4 4 0; F 9 4 0")  # fmt: skip
+    for name, text in (("EMPTY", ""), ("BARE", "L Y+2")):  # the main program goes on behind a file that has no end
+        (tmp_path / f"{name}.H").write_text(text)
+    called = "CALL PGM EMPTY\nL X+1\nCALL PGM BARE.H\nL X+2\nCALL PGM EMPTY\nL X+3"
+    check_path(read(called, controller=control), "F 1 0 0; F 1 2 0; F 2 2 0; F 3 2 0")
 
 
 def test_check_says_the_language_why_and_what_it_needs(capsys, tmp_path):

@@ -213,6 +213,9 @@ def test_subprograms_in_files_and_skipped_blocks(tmp_path):
     (tmp_path / "Side.spf").write_text("PROC SIDE(REAL A)\nG91 G1 X=A\nIF A<3\nSIDE(A+1)\nENDIF\nG90\nM17\n")
     control = Controller(DIALECTS["siemens"], subprograms=str(tmp_path), switches=frozenset({3}))
     check_path(read("F100\n/3 X99\n/1 Y1\nSIDE(1)\nX0", control), "F 0 1 0; F 1 1 0; F 3 1 0; F 6 1 0; F 0 1 0")
+    for name, text in (("EMPTY", ""), ("BARE", "G1 Y2")):  # the main program goes on behind a file that has no end
+        (tmp_path / f"{name}.SPF").write_text(text)
+    check_path(read("F100\nEMPTY\nG1 X1\nBARE\nX2\nEMPTY\nX3", control), "F 1 0 0; F 1 2 0; F 2 2 0; F 3 2 0")
     with pytest.raises(InputError, match="subprograms within each other") as caught:
         (tmp_path / "AGAIN.SPF").write_text("\nAGAIN\n")
         read("F100\nAGAIN", control)

@@ -11,13 +11,16 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.image import imread
+from scipy.ndimage import uniform_filter
 
 from tests.report.factory import make_analysis, short, spiral
 from toolpath_stiff.report.colours import CLASSES, SLATE
 from toolpath_stiff.report.curves import extremes_by_column, profile_curve, scale_limits
+from toolpath_stiff.report.pictures import drawing
 from toolpath_stiff.report.pictures import path as path_module
-from toolpath_stiff.report.pictures.files import picture_file
+from toolpath_stiff.report.pictures.files import house_style, picture_file
 from toolpath_stiff.report.pictures.path import UNREACHABLE, path, segment_classes
 from toolpath_stiff.report.pictures.profile import _set_limits, profile
 from toolpath_stiff.report.pictures.style import new_figure
@@ -54,6 +57,19 @@ def test_the_same_analysis_gives_the_same_bytes_whatever_the_users_own_settings(
     with mpl.rc_context({"figure.facecolor": "black", "axes.labelsize": 30, "lines.linewidth": 9}):
         assert (path_picture(analysis), profile_picture(analysis)) == first
         assert mpl.rcParams["axes.labelsize"] == 30  # and the settings are left alone
+
+
+@pytest.mark.parametrize("draw", [path, profile])
+def test_texts_and_scales_are_those_that_matplotlib_itself_draws(analysis, draw):
+    with house_style():
+        ours, canvas = drawing.pixels(draw(analysis)).astype(int), FigureCanvasAgg(draw(analysis))
+        canvas.draw()
+    theirs = np.asarray(canvas.buffer_rgba())[:, :, :3].astype(int)
+    assert ours.shape == theirs.shape
+    # A text begins at a whole pixel, with matplotlib between two: a shift below one pixel, which blurring removes.
+    apart = np.abs(uniform_filter((ours - theirs).mean(axis=2), 5))
+    assert apart.max() < 60.0
+    assert (apart > 15.0).mean() < 4e-3
 
 
 def test_pictures_need_no_pyplot():

@@ -17,7 +17,7 @@ from toolpath_stiff.correction.task import UpdateTask
 from toolpath_stiff.correction.update import update
 from toolpath_stiff.diagnosis.diagnose import common_verdict, diagnose, with_plan
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.inference.drawn import CONFIRMS, foretold
+from toolpath_stiff.inference.drawn import CONFIRMS, log_predictive
 from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.judgement import judge
 from toolpath_stiff.inference.left_out import held_out
@@ -106,7 +106,7 @@ def test_one_new_point_confirms_nothing(tmp_path):
     assert "too few" in found.drawn.reason
 
 
-def test_what_is_foretold_is_the_normal_distribution_given_the_other_readings(described):
+def test_the_log_predictive_is_the_normal_distribution_given_the_other_readings(described):
     """Against dense matrices: conditional mean and covariance of each left-out point."""
     fit = described[0].fits["saddle"]
     labels = np.where(OLD, "seen", np.char.add("new ", DATA.point))
@@ -121,7 +121,7 @@ def test_what_is_foretold_is_the_normal_distribution_given_the_other_readings(de
         off = residual[out] - weights @ residual[~out]
         own = whole[np.ix_(out, out)] - weights @ whole[np.ix_(~out, out)]
         squares += off @ np.linalg.solve(own, off)
-    assert foretold(fit, DATA, OLD, fit.scatter) == pytest.approx(-0.5 * squares, rel=1e-8)
+    assert log_predictive(fit, DATA, OLD, fit.scatter) == pytest.approx(-0.5 * squares, rel=1e-8)
 
 
 def test_a_reading_is_known_again_however_its_file_is_laid_out():

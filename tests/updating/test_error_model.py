@@ -72,8 +72,8 @@ def test_bands_hold_as_often_as_they_say():
         factors = jacobian[m:] @ errors.loadings
         factors[:, -42:] -= errors.of_geometry(shared.T[m:])
         sd = np.sqrt((factors**2).sum(axis=1) + errors.form(errors.nearness(place[m:])) ** 2)
-        foretold = jacobian[m:] @ law + shared[: len(moved), m:].T @ (moved @ scatter.precision.times(left))
-        off = np.abs(wrong[m:] - foretold) / sd
+        predicted = jacobian[m:] @ law + shared[: len(moved), m:].T @ (moved @ scatter.precision.times(left))
+        off = np.abs(wrong[m:] - predicted) / sd
         inside.append([np.mean(off < 1.96 * width) for width in widths])
     narrower, held, wider = np.mean(inside, axis=0)
     assert 0.93 < held < 0.97

@@ -13,8 +13,8 @@ from toolpath_stiff.correction.task import MACHINE, UpdateTask
 from toolpath_stiff.correction.update import build_ladder
 from toolpath_stiff.inference.entries import SERIES, entries, place_of
 from toolpath_stiff.inference.fair_forms import fair_rivals
-from toolpath_stiff.inference.foretold import votes
 from toolpath_stiff.inference.nuisances import findings, fitted_nuisances, nuisance_words
+from toolpath_stiff.inference.prequential import votes
 from toolpath_stiff.inference.votes import SMALL, chance_of_losing, closest, outvoted, standard_error, vote_words
 from toolpath_stiff.stiffness.active import ActiveEffect
 from toolpath_stiff.stiffness.catalogue import find_effect

@@ -130,9 +130,7 @@ def evaluate(
     corner = corners(position, abc, lengths)
     many = n - int(np.count_nonzero(corner)) >= core.CLOSED_FORM_FROM
     directed = many and load.kind != "softest" and core.is_closed_form(model)
-    stand = Reach(np.empty(n), np.zeros(n, dtype=np.int8), np.empty(n), machine_limits(model.machine))
-    substituted, extrapolated = np.zeros((2, n), dtype=bool)
-    result = Evaluation(np.empty(n), substituted, np.empty((n, 6)), extrapolated, stand)
+    result = _to_fill(model.machine, n)
     for start in range(0, n, BLOCK):
         stop = min(start + BLOCK, n)
         block = np.arange(start, stop)
@@ -157,6 +155,13 @@ def evaluate(
     return result
 
 
+def _to_fill(machine: MachineTool, n: int, configuration: str = "") -> Evaluation:
+    """Evaluation of n poses, into which the figures of some rows after the others are put."""
+    stand = Reach(np.empty(n), np.zeros(n, dtype=np.int8), np.empty(n), machine_limits(machine))
+    joints, (substituted, extrapolated) = np.empty((n, len(machine.joint_names))), np.zeros((2, n), dtype=bool)
+    return Evaluation(np.empty(n), substituted, joints, extrapolated, stand, configuration)
+
+
 def _poses(position: FloatArray, abc: FloatArray, tool: float, rows: IntArray | slice) -> Poses:
     angles = abc[rows]
     return position[rows], rotation_matrices(angles) if angles.any() else None, tool
@@ -164,12 +169,13 @@ def _poses(position: FloatArray, abc: FloatArray, tool: float, rows: IntArray | 
 
 def corners(position: FloatArray, abc: FloatArray, lengths: FloatArray) -> BoolArray:
     """(n,) True where a move ends and the next starts in the next row: one pose, two tangents. All False if few."""
-    corner = np.zeros(len(position), dtype=bool)
-    corner[:-1] = True
+    corner = np.arange(len(position)) < len(position) - 1
     for values in (*position.T, *abc.T, np.nan_to_num(lengths, nan=-1.0)):
         corner[:-1] &= values[1:] == values[:-1]
+        if np.count_nonzero(corner) <= FEW_CORNERS * len(corner):
+            return np.zeros_like(corner)
     corner[1:] &= ~corner[:-1]  # of more than two equal rows, only the first two are a corner
-    return corner if np.count_nonzero(corner) > FEW_CORNERS * len(corner) else np.zeros_like(corner)
+    return corner
 
 
 def _by_closed_form(
@@ -281,11 +287,7 @@ def _by_elements(
     if follows and n and len(machine.configurations) > 1:
         few = tried_rows(n)
         kept = int(kept_configurations(machine, position[few], rotation_matrices(abc[few]), lengths[few])[0])
-    stand = Reach(np.empty(n), np.zeros(n, dtype=np.int8), np.empty(n), machine_limits(machine))
-    substituted, extrapolated = np.zeros((2, n), dtype=bool)
-    joints, name = np.empty((n, len(machine.joint_names))), machine.configurations[kept or 0] if follows else ""
-    result = Evaluation(np.empty(n), substituted, joints, extrapolated, stand, name)
-    before = None
+    result, before = _to_fill(machine, n, machine.configurations[kept or 0] if follows else ""), None
     if follows and n:
         before = machine.solve(position[:1], rotation_matrices(abc[:1]), lengths[:1], kept).joints[0]
     for start in range(0, n, BLOCK):

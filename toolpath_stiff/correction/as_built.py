@@ -76,6 +76,6 @@ def _held_out(fit: Fit, known: FloatArray, pull: FloatArray, held: HeldOut) -> H
     residual, precision = held.residual.copy(), fit.scatter.precision
     for move, out in zip(held.moves, Groups.by(held.point).members(), strict=True):
         left = fit.residual - fit.jacobian @ move
-        foretold = np.linalg.solve(precision.block(out), precision.times(left)[out])
-        residual[out] -= known[:, out].T @ (pull @ left - pull[:, out] @ foretold)
+        predicted = np.linalg.solve(precision.block(out), precision.times(left)[out])
+        residual[out] -= known[:, out].T @ (pull @ left - pull[:, out] @ predicted)
     return replace(held, residual=residual)

@@ -33,10 +33,10 @@ from toolpath_stiff.errors import EffectError, InputError
 from toolpath_stiff.inference.element_fits import GAIN, JOINTS, PullProblem, explanations, joints_say_more, question
 from toolpath_stiff.inference.errors import AS_GIVEN
 from toolpath_stiff.inference.evidence import Fit
-from toolpath_stiff.inference.foretold import votes
 from toolpath_stiff.inference.hypotheses import Family
 from toolpath_stiff.inference.left_out import gain_in_standard_errors
 from toolpath_stiff.inference.noise import Noise
+from toolpath_stiff.inference.prequential import votes
 from toolpath_stiff.inference.votes import outvoted
 from toolpath_stiff.machine.model import MachineTool
 from toolpath_stiff.readings.pulls import Pulls

@@ -44,11 +44,11 @@ from toolpath_stiff.inference.drawn import Drawn, drawn, seen_readings
 from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED
 from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.fits import add_effect, base_fit, baseline, refine
-from toolpath_stiff.inference.foretold import votes
 from toolpath_stiff.inference.gates import gain_threshold, simulate
 from toolpath_stiff.inference.hypotheses import Family, score_families, signatures, tables_of
 from toolpath_stiff.inference.left_out import gain_in_standard_errors
 from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.inference.prequential import votes
 from toolpath_stiff.inference.rivals import rivals_of_law
 from toolpath_stiff.inference.votes import outvoted, standard_error
 from toolpath_stiff.planning.plan import reading_words, telling

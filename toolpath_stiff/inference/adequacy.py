@@ -6,10 +6,10 @@ import numpy as np
 
 from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.fits import with_given_law
-from toolpath_stiff.inference.foretold import votes
 from toolpath_stiff.inference.hypotheses import Family
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.inference.nuisances import mean_left_by_nuisances
+from toolpath_stiff.inference.prequential import votes
 from toolpath_stiff.inference.rivals import rivals_of_law
 from toolpath_stiff.inference.unexcluded import rooms
 from toolpath_stiff.inference.votes import SMALL, Votes, outvoted

@@ -2,7 +2,7 @@
 
 A form that was drawn through residuals fits them; that it does says nothing of other readings. So an effect carries the
 marks of the readings that it was drawn from (`Effect.described_from`), and where they are among the readings that are
-judged, it is `described`, not `identified`, until the others confirm it. They do if they are foretold better with the
+judged, it is `described`, not `identified`, until the others confirm it. They do if they are predicted better with the
 effect than by any explanation without it that was tested, `none` among them: each of their points is left out in turn,
 sizes and strut law are fitted to all the rest, and the log probability of what was left out, added up over the points,
 must be higher by more than `CONFIRMS`.
@@ -115,7 +115,7 @@ def drawn(fit: Fit, others: Mapping[str, Fit], data: Readings) -> Drawn | None:
     if len(np.unique(data.point[~seen])) < FEWEST_POINTS:
         return standing
     gains = {
-        name: foretold(fit, data, seen, other.scatter) - foretold(other, data, seen, other.scatter)
+        name: log_predictive(fit, data, seen, other.scatter) - log_predictive(other, data, seen, other.scatter)
         for name, other in others.items()
         if not drawn_here(other)
     }
@@ -123,7 +123,7 @@ def drawn(fit: Fit, others: Mapping[str, Fit], data: Readings) -> Drawn | None:
     return replace(standing, gain=gains[rival], rival=rival)
 
 
-def foretold(fit: Fit, data: Readings, seen: BoolArray, scatter: Scatter) -> float:
+def log_predictive(fit: Fit, data: Readings, seen: BoolArray, scatter: Scatter) -> float:
     """Log probability of the readings that are not `seen`, each point left out in turn, up to a constant.
 
     Given all other readings r_s, the left-out ones are normal: with A the inverse covariance of all residuals r, their

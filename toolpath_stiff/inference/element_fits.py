@@ -16,9 +16,9 @@ from toolpath_stiff.inference.candidates import Candidate, Component, candidates
 from toolpath_stiff.inference.covariances import Covariance, Groups
 from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.fits import add_effect, base_fit, fit_effects, settled
-from toolpath_stiff.inference.foretold import votes
 from toolpath_stiff.inference.least_squares import bounded_step
 from toolpath_stiff.inference.noise import CONTRADICTED, GUESSES, STATED_FREEDOM, Noise, Scatter
+from toolpath_stiff.inference.prequential import votes
 from toolpath_stiff.inference.repeats import OUTLIER_WIDTH, OUTLIERS
 from toolpath_stiff.inference.votes import outvoted
 from toolpath_stiff.machine.elements import turns

@@ -40,12 +40,12 @@ from toolpath_stiff.inference.entries import entries, exchanged, shortened
 from toolpath_stiff.inference.evidence import Fit, Problem
 from toolpath_stiff.inference.fair_forms import fair_rivals
 from toolpath_stiff.inference.fits import refine
-from toolpath_stiff.inference.foretold import carried, votes
 from toolpath_stiff.inference.gates import Forms, Gate, absolute_gate, simulate
 from toolpath_stiff.inference.hypotheses import Family, discrepancy_evidence, probabilities, score_families, signatures
 from toolpath_stiff.inference.left_out import held_out
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.inference.nuisances import TAKEN_UP, not_told
+from toolpath_stiff.inference.prequential import carried, votes
 from toolpath_stiff.inference.rivals import lowers_error, rivals_of
 from toolpath_stiff.inference.several import search_pairs
 from toolpath_stiff.inference.unexcluded import Unexcluded, not_excluded

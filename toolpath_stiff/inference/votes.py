@@ -1,4 +1,4 @@
-"""Evaluation of votes of poses between two explanations (`foretold`): beyond chance or not, in words and as data.
+"""Evaluation of votes of poses between two explanations (`prequential`): beyond chance or not, in words and as data.
 
 A rival is outvoted where the sum of them is
 

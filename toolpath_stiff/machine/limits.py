@@ -343,22 +343,18 @@ class Extremes:
     def reach(self) -> tuple[Reach, BoolArray]:
         """`Reach` of the poses; (n,) False where an angle too small for its cosine decides, and `reach` is needed."""
         n = self.position.shape[1]
-        margin, value, which = np.full(n, np.inf), np.full(n, np.inf), np.zeros(n, dtype=np.int64)
-        for number, (limit, _) in enumerate(self.kinds):
-            apart = limit.margin(self.of(limit))
-            nearer = apart < margin
-            np.copyto(margin, apart, where=nearer)
-            np.copyto(which, number, where=nearer)
-        column, sure = np.zeros(n, dtype=np.int64), np.ones(n, dtype=bool)
-        for number, (limit, columns) in enumerate(self.kinds):
-            rows = np.flatnonzero(which == number)
+        apart = [limit.margin(self.of(limit)) for limit, _ in self.kinds]
+        margin = np.full(n, np.inf)
+        for share in apart:
+            np.minimum(margin, share, out=margin)
+        nearest, column, sure = np.full(n, np.inf), np.zeros(n, dtype=np.int64), np.ones(n, dtype=bool)
+        for (limit, columns), share in zip(self.kinds[::-1], apart[::-1], strict=True):  # the first of equal ones
+            rows = np.flatnonzero(share == margin)
             if len(rows):
-                value[rows] = self.of(limit)[rows]
+                nearest[rows] = self.of(limit)[rows]
                 column[rows] = columns[0] if len(columns) == 1 else columns[self._strut(limit, rows)]
-                if limit.quantity in (FRAME, PLATFORM):
-                    sure[rows] = value[rows] > np.arccos(NEARLY_ONE)
-        value[margin == np.inf] = np.inf
-        return Reach(margin, column, value, machine_limits(self.machine)), sure
+                sure[rows] = limit.quantity not in (FRAME, PLATFORM) or nearest[rows] > np.arccos(NEARLY_ONE)
+        return Reach(margin, column, nearest, machine_limits(self.machine)), sure
 
     def of(self, limit: Limit) -> FloatArray:
         """(n,) extreme values of a limit's quantity."""

@@ -199,14 +199,17 @@ class ProgramRun:
             raise self._fail(row, f"{problem}: no variable or position changes, or nothing moves", "a loop that ends")
         self._passes[row] = now
 
-    def _load(self, names: Iterable[str], before: tuple[str, ...] = ()) -> int | None:
-        """Read the first of these files that exists in the folder; returns its first line, None if none exists."""
+    def _load(self, names: Iterable[str], before: tuple[str, ...] = (), after: tuple[str, ...] = ()) -> int | None:
+        """Read the first of these files that exists in the folder; returns its first line, None if none exists.
+
+        `before`, `after`: lines that end what stands before the file, and the file.
+        """
         files = (self.folder / name for name in names) if self.folder is not None else ()
         file = next((file for file in files if file.is_file()), None)
         if file is None:
             return None
         first = len(self.lines) + len(before)
-        self.lines = (*self.lines, *before, *read_lines(file))
+        self.lines = (*self.lines, *before, *read_lines(file), *after)
         self._files.append((first, len(self.lines), file.name))
         self._programs = self._sequence = None
         return first

@@ -233,7 +233,7 @@ def _end_rotations(state: PosedRows, relative: FloatArray, platform_turn: FloatA
     across = np.eye(3) - state.units[..., :, None] * state.units[..., None, :]
     at_platform = strut_turn - across @ platform_turn[:, None]
     turns = np.concatenate([strut_turn, at_platform], axis=1)
-    return np.einsum("nkci,nkcj->nij", turns, turns, optimize=True)
+    return np.asarray(np.einsum("nkci,nkcj->nij", turns, turns, optimize=True))
 
 
 def _nodes(state: PosedRows) -> FloatArray:

@@ -263,10 +263,12 @@ class HeidenhainRun(ProgramRun):
         stem = name.removesuffix(".H")
         first = next((first for first, _, file in self._files if PurePath(file).stem.upper() == stem), None)
         if first is None:
-            first = self._load(self._files_called(stem, (".H", "")), ("END PGM",))  # which ends what has no END PGM
+            end = ("END PGM",)  # of what has none
+            first = self._load(self._files_called(stem, (".H", "")), end, end)
             if first is None:
                 problem = f"CALL PGM {name}: no folder of programs has it"
-                raise self._fail(row, problem, "--subprograms FOLDER, with that file", column=statement.column)
+                expected = "--subprograms FOLDER, with that file; an empty one, if it moves nothing"
+                raise self._fail(row, problem, expected, column=statement.column)
             self._lexer = PlainRun(self.state, as_g_code(self.lines), self.name)
         self._begin(Subprogram(name, first, statement.after, 0, {}), row, statement.column)
         self._locals.append({})

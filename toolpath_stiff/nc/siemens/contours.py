@@ -48,7 +48,8 @@ def mill_contour(state: State, block: CurrentBlock, code: str) -> None:
     side, leads = SIDES[values["RL"]], list[tuple[complex, complex, complex | None]]()
     apart = abs(side) * (radius + (0.0 if finish else values["FAL"]))
     for name, way, place, element in (("1", -1, contour[0][0], contour[0]), ("2", 1, contour[-1][1], contour[-1])):
-        kind, size, ahead = values[f"AS{name}"], values[f"LP{name}"], direction(element, place)
+        kind, size = (values[f"{word}{name}"] or values[f"{word}1"] for word in ("AS", "LP"))  # out as in, if not given
+        ahead = direction(element, place)
         wrong = kind not in (1.0, 2.0, 3.0) or size <= 0.0 or (kind > STRAIGHT and not side)
         block.refuse_if(wrong, f"AS{name}", "is no lead in the plane with a length (LP1, LP2)", "1; 2, 3 beside a side")
         beside = place + side * apart * 1j * ahead

@@ -71,7 +71,8 @@ class SiemensRun(ParametricRun):
         """Find programs and labels; plain blocks are left to the reader of plain lines."""
         self._begins = heads_of(self.lines)
         self._labels, self._subs = labels_of(self._begins), programs_of(self._begins)
-        self._ends = {row for row in self._subs.values() if any(code_text(text).strip() for text in self.lines[:row])}
+        begins = {row for row in self._subs.values() if any(code_text(text).strip() for text in self.lines[:row])}
+        self._ends = begins | {row for row, text in enumerate(self.lines) if text == END_OF_FILE}
         self._plain = self._lexer = PlainRun(self.state, plain_texts(self.lines, self._begins), self.name)
 
     def run(self) -> list[Remark]:
@@ -101,9 +102,8 @@ class SiemensRun(ParametricRun):
             block = Block(row + 1, (), optional=bool(slash), switch=int(slash[1:] or 1) or 1)
             steering = None
             if not self._is_head(row):
-                steering = steering_of(
-                    self._scanner(row, begin.end()), lambda place: lambda _: self._scanner(row, place).real()
-                )
+                scanner = self._scanner(row, begin.end())
+                steering = steering_of(scanner, lambda place: lambda _: self._scanner(row, place).real())
             self._statements[row] = Statement(block, steering=steering)
         return self._statements[row]
 
@@ -327,13 +327,13 @@ class SiemensRun(ParametricRun):
     def _sub(self, name: str, row: int, column: int) -> int:
         """The line that a subprogram begins with, in the file or in one of the folder."""
         files = () if name in self._subs else self._files_called(name, SUFFIXES)
-        if self._load(files, (f"%_N_{name}_SPF",)) is not None:
-            self.lines = (*self.lines, END_OF_FILE)
+        if self._load(files, (f"%_N_{name}_SPF",), (END_OF_FILE,)) is not None:
             self._structure_known = None
             self._lex()
         if name not in self._subs:
             problem = f"{name} is no word that is known, and no subprogram of the file or of a folder"
-            raise self._fail(row, problem, "--subprograms FOLDER, with that file", column=column)
+            expected = "--subprograms FOLDER, with that file; an empty one, if it moves nothing"
+            raise self._fail(row, problem, expected, column=column)
         return self._subs[name]
 
     def _bound(

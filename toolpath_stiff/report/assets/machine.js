@@ -96,7 +96,7 @@ class MachineBody {
     const add = (shape, a, b, radius, paint, alpha = through(between(a, b, 0.5))) =>
       items.push(shape(view, a, b, radius * size, paint, alpha));
     const joint = (place, radius, paint) => items.push(ball(view, place, radius * size, paint,
-      paint === ink.accent ? Math.min(1, clear + 0.35) : through(place)));
+      paint === ink.accent ? 1 : through(place)));
     const bodies = this.at(pose).filter(({ points: [a, b] }) => Math.hypot(...minus(a, b)) > 1e-3);
     bodies.forEach(({ name, link, points }, k) => {
       const [a, b] = points, plain = colour(link, name, k % 2 || hangs ? metal : pale);

@@ -96,8 +96,6 @@ def variables(comparison: Comparison) -> Figure:
         axes.axhline(0.0, color=MUTED, lw=0.8, zorder=1)
         axes.set_ylim(*limits)
         axes.tick_params(labelsize=7.5, pad=2, labelleft=not j)
-        for axis in (axes.xaxis, axes.yaxis):
-            axis.set_label_coords(0.5, 0.0)  # fixed: without a name, no search for room beside the figures
         unit = str(getattr(variable, "unit", ""))
         name = plain(variable.name.removesuffix(f"_{unit}").replace("_", " ")) + (f", {unit}" if unit else "")
         axes.set_title(shortened(name, 30), fontsize=9, pad=3)
@@ -172,8 +170,7 @@ def _name_levels(axes: Axes, names: list[str]) -> None:
         axes.set_xticks(range(len(names)), [shortened(plain(_brief(name)) or "(none)", room) for name in names])
         axes.set_xlim(-0.5, len(names) - 0.5)
     else:
-        axes.set_xticks([0, len(names) - 1], ["first", f"last of {len(names)}"])
-        axes.get_xticklabels()[1].set(ha="right")
+        axes.set_xticks([0.5 * (len(names) - 1)], [f"{len(names)} of them, in order"])
 
 
 def _rank(name: str) -> tuple[float, str]:

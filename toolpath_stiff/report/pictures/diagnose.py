@@ -164,13 +164,13 @@ def _bars(axes: Axes, portrait: Portrait) -> None:
     for y, (_, value, _) in enumerate(rows):
         text = probability_text(value)
         axes.annotate(text, (value, y), xytext=(4, 0), textcoords="offset points", va="center", size=9)
-    axes.set_yticks(range(len(rows)), [name for name, *_ in rows], color=INK)
+    axes.set_yticks(range(len(rows)), [name for name, *_ in rows])
     axes.set_ylim(max(len(rows), 5) - 0.5, -0.5)
     _probability_axis(axes, 1.15)
     axes.set_title("which link (blue), what it varies with (orange)", size=9.5, loc="right", weight="normal")
     axes.grid(visible=False, axis="y")
     open_frame(axes, "left")
-    axes.tick_params(axis="y", length=0)
+    axes.tick_params(axis="y", length=0, labelcolor=INK)
 
 
 def fits(diagnosis: Diagnosis) -> Figure:

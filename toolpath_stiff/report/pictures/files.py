@@ -10,11 +10,11 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from toolpath_stiff.report import colours
+from toolpath_stiff.report.pictures.drawing import pixels
 from toolpath_stiff.report.pictures.style import DPI, Look
 from toolpath_stiff.units import MM_PER_INCH, m_from_mm
 
@@ -31,6 +31,8 @@ STYLE: Look = {
     "axes.titley": 1.0,  # its default place, fixed: the search for obstacles takes a tenth of the drawing time
     "axes.grid": True,
     "axes.axisbelow": True,
+    "axes.formatter.useoffset": False,
+    "axes.formatter.limits": (-99, 99),
     "grid.color": colours.GRID,
     "grid.linewidth": 0.8,
     "text.color": colours.INK,
@@ -45,9 +47,10 @@ STYLE: Look = {
 @contextmanager
 def house_style() -> Iterator[None]:
     """Set matplotlib's defaults to our style, whatever the user's own settings; undone at the end."""
+    # `mpl.rcdefaults` would read every style that comes with matplotlib first.
+    defaults: Look = {name: value for name, value in mpl.rcParamsDefault.items() if not name.startswith("backend")}
     with mpl.rc_context(), warnings.catch_warnings():
-        mpl.rcdefaults()
-        mpl.rcParams.update(STYLE)  # type: ignore[arg-type]
+        mpl.rcParams.update(defaults | STYLE)  # type: ignore[arg-type]
         warnings.filterwarnings("ignore", message="Glyph .* missing", category=UserWarning)
         yield
 
@@ -59,13 +62,11 @@ def picture_file(name: str, draw: Callable[..., Figure | None], result: Any, dpi
         if figure is None:
             return b""
         figure.set_dpi(dpi)
-        canvas: Any = FigureCanvasAgg(figure)
         if name.endswith(".pdf"):
             content, no_data = io.BytesIO(), dict.fromkeys(("CreationDate", "Producer", "Creator"))
-            canvas.print_figure(content, format="pdf", metadata=no_data)
+            figure.savefig(content, format="pdf", metadata=no_data)
             return content.getvalue()
-        canvas.draw()
-    return _packed(np.asarray(canvas.buffer_rgba())[:, :, :3], dpi)
+        return _packed(pixels(figure), dpi)
 
 
 def _packed(pixels: NDArray[np.uint8], dpi: int) -> bytes:

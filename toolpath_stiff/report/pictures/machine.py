@@ -43,7 +43,6 @@ def machine_at(_: object, *, machine: MachineTool, pose: FloatArray) -> Figure:
         axes.plot(*tip[seen], "o", color=TOOL, ms=8)
         axes.set_aspect("equal", adjustable="datalim")
         axes.margins(0.06)
-        axes.grid(True, color="#e5e7eb", lw=0.6)
         axes.set(title=title, xlabel=f"{'XYZ'[first]} mm", ylabel=f"{'XYZ'[second]} mm")
     columns = zip(machine.joint_names, joint_columns(machine, stance.joints).items(), strict=True)
     words = [f"{name} {values[0]:.1f} {column.rpartition('_')[2]}" for name, (column, values) in columns]

@@ -55,7 +55,7 @@ function effectsPanel(state, act) {
   return [
     h("h2", {}, "Which effect is missing?"),
     h("div", { class: "actions" }, button("Fit", () => act({ do: "fit" }), { id: "fit", class: "main live",
-      disabled: !on || !state.readings }),
+      disabled: !on || !state.readings, title: on ? null : "switch an effect on first" }),
       button("Accept the fit", () => act({ do: "accept" }), { id: "accept", disabled: !(fit?.accepted && fit.holds) }),
       state.machine.effects.length ? h("span", { class: "muted" },
         `in the machine: ${state.machine.effects.join(", ")}`) : null),

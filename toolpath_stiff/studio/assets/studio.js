@@ -257,10 +257,10 @@ function play() {
 function drawLegend() {
   const parts = [];
   if (state.readings) parts.push(h("div", { title: "Larger dots: larger errors. Rings: set aside." },
-    `softer \u2212${scene.scale} %`,
+    `softer \u2212${group(scene.scale)} %`,
     h("span", { class: "ramp",
     style: `background:${ramp([-1, -0.5, 0, 0.5, 1].map((t) => errorColour(t * scene.scale, scene.scale)))}` }),
-    `+${scene.scale} % stiffer`));
+    `+${group(scene.scale)} % stiffer`));
   if (state.program?.path) { const [unit, digits] = layer(); parts.push(h("div", {},
     `path ${group(scene.ends[0], digits)}`, h("span", { class: "ramp" }),
     `${group(scene.ends[1], digits)} ${unit}`)); }

@@ -1,11 +1,11 @@
 """Votes of readings between explanations, pose after pose: a name needs more than a probability.
 
-A probability holds the price of an explanation's parameters (Occam's factor). Of two explanations that foretell the
-readings equally well it prefers the one with fewer, and so names a part for its bookkeeping. So each pose is foretold
+A probability holds the price of an explanation's parameters (Occam's factor). Of two explanations that predict the
+readings equally well it prefers the one with fewer, and so names a part for its bookkeeping. So each pose is predicted
 from those before it (Dawid 1984, Present position and potential developments: the prequential approach): sizes and law
 as fitted, at a price of 1 each (Akaike 1973); what struts, joints, links and clampings have in common known from the
 poses before, under the scatter that is assumed of them: an explanation that needs a joint five standard deviations off
-pays for it. (Were each pose left out and foretold from all others, it would not.) The log densities add up to that of
+pays for it. (Were each pose left out and predicted from all others, it would not.) The log densities add up to that of
 all readings; their differences between two explanations are the votes, and independent but for the fits.
 """
 
@@ -79,6 +79,6 @@ def _squares_by_point(residuals: FloatArray, covariance: Covariance, points: Gro
     solved = covariance.blocks.times(rows)
     products = np.cumsum([solved[:, out] @ rows[:, out].T for out in points.members()], axis=0)
     known, pull = np.eye(count) + products[:, :count, :count], products[:, :count, count:]
-    foretold = (pull * np.linalg.solve(known, pull)).sum(axis=1)
-    whole = np.diagonal(products[:, count:, count:], axis1=1, axis2=2) - foretold
+    predicted = (pull * np.linalg.solve(known, pull)).sum(axis=1)
+    whole = np.diagonal(products[:, count:, count:], axis1=1, axis2=2) - predicted
     return np.asarray(np.diff(whole, axis=0, prepend=0.0).T)
