@@ -87,8 +87,7 @@ def _draw_scale(axis: Any, renderer: Any) -> None:
     if look[side]:
         gc.set_snap(True)
         _strokes(renderer, gc, places[shown], (edge, edge + mark * out), upright)
-    beside = edge + out * (mark * look[side] + look.get("pad", GAP))
-    reach = edge
+    beside, reach = edge + out * (mark * look[side] + look.get("pad", GAP)), edge
     if look[f"label{side}"]:
         font = FontProperties(size=look.get("labelsize", SIZE))
         size = point * font.get_size_in_points()
