@@ -104,7 +104,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         except TpsError as error:
             return _ended(f"tps: error: {error}\n", error.exit_code)
         except (KeyboardInterrupt, Exception) as error:
-            if KeyboardInterrupt in (type(error), type(error.__cause__)):  # or it came while a library was loaded
+            # A library that is being loaded may turn an interrupt into an error of its own.
+            if isinstance(error, KeyboardInterrupt) or isinstance(error.__cause__, KeyboardInterrupt):
                 return _ended("tps: interrupted; no file is half-written\n", 130)
             return _ended(f"tps: error: {last_resort(error)}\n", 2)
 

@@ -75,10 +75,7 @@ def standing(
             notes.append(f"poses without joint values: taken in the configuration {machine.configurations[kept]}")
     if (lost := np.asarray(np.isnan(joints).any(axis=1))).any():
         refuse(lost, "no joint values lead to the pose", hint=f"{hint}; {ELSEWHERE}" if hint else ELSEWHERE)
-    beyond = np.flatnonzero(by_joints & (joint_margin(joints.T, machine.joint_limits) < 0.0))
-    if len(beyond):
-        file, line = places[beyond[0]]
-        notes.append(f"{file}:{line}: joints beyond their limits in the machine file (rows: {len(beyond)})")
+    notes += _beyond_limits(by_joints & (joint_margin(joints.T, machine.joint_limits) < 0.0), places)
     turning = joints[by_joints][:, [kind != "linear" for kind in machine.joint_kinds]]
     if len(np.unique(turning, axis=0)) >= SEVERAL and turning.any() and np.abs(turning).max() < SMALL_TURNS:
         small = f"no joint turns by more than {deg_from_rad(float(np.abs(turning).max())):.3g} deg"
@@ -87,6 +84,13 @@ def standing(
     if errors:
         raise InputErrors(errors)
     return machine.standing(joints), notes
+
+
+def _beyond_limits(beyond: BoolArray, places: Sequence[tuple[str, int]]) -> list[str]:
+    if not beyond.any():
+        return []
+    file, line = places[int(np.argmax(beyond))]
+    return [f"{file}:{line}: joints beyond their limits in the machine file (rows: {np.count_nonzero(beyond)})"]
 
 
 def _other_axes(position: FloatArray, tip: FloatArray) -> tuple[FloatArray, FloatArray] | None:
