@@ -37,7 +37,6 @@ BY_TEXT, PATH = ("CALL", "EXTCALL"), re.compile(r"^(?:.*/)?(?:_N_)?|[._][SM]PF$"
 TIMES = re.compile(r"P(?=\s*[=\d(])")
 PARAMETER = re.compile(r"(VAR\s+)?(REAL|INT|BOOL)\s+(\w+)\s*(\[[^]]*\])?(?:\s*=\s*([^,)]+))?", re.ASCII)
 ELEMENT, INDEX = re.compile(r"\[[\d,]+\]"), re.compile(r"(?<=[\[,])[A-Z_]\w*(?=[\],])", re.ASCII)
-R_PARAMETER = re.compile(r"R\[?(\d+)\]?")
 SECTION = re.compile(r"(REPEATB?)\s+(\w+)(?:\s+(?!P\s*=)(\w+))?", re.ASCII)
 END_OF_FILE, SUFFIXES = "%_N__END_SPF", (".SPF", ".MPF", "")
 SEARCHED = ("$P_SEARCH", "$P_SEARCHL", "$P_ISTEST", "$P_SIM", "$P_DRYRUN")
@@ -126,7 +125,7 @@ class SiemensRun(ParametricRun):
     def _scope(self, name: str) -> tuple[Values, str]:
         """Dictionary that holds a variable (R parameters: common to all programs), and its key, index as number."""
         name = INDEX.sub(self._index, name) if "[" in name else name
-        parameter, base = R_PARAMETER.fullmatch(name), name.partition("[")[0]
+        parameter, base = re.fullmatch(r"R\[?(\d+)\]?", name), name.partition("[")[0]
         if parameter:
             return self.variables.common, f"R{parameter[1]}"
         called = next((level for level in reversed(self._levels) if level.stop < 0), None)
