@@ -204,7 +204,6 @@ def kinds() -> tuple[Kind, ...]:
         Kind("measurements", (MEASURED,), measurements),
         Kind("raw records", (RAW,), _file("raw.csv", reduce)),
         Kind("plans", (PLAN,), _file("plan.csv", lambda name: read_plan(name, nominal))),
-        Kind("plans to be measured", (PLAN,), _file("p.csv", lambda name: read_measurements(name, nist, planned=True))),
         Kind("poses", (POSES,), _file("poses.csv", read_poses)),
         Kind("workbooks", (_workbook(),), measurements, lines=False),
         Kind("files with effects", (effect_template("mine").text.encode(),), _effects),
