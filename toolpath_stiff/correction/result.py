@@ -341,17 +341,17 @@ class Update(FolderResult):
             return f"{doubt}{nothing} Mean error: {self._errors}."
         held = 100.0 * last.held.mean_error
         errors = f"Mean error: {self._errors}{f' ({held:.2f} % at left-out points)' if np.isfinite(held) else ''}."
-        if self.worse:
-            return f"{doubt}The new machine would fit worse than the one given: it is not written. {errors}"
         doubted = [support for support in self.supports if not support.supported]
         doubts = [*(f"{support.effect}: {', and '.join(support.reasons)}" for support in doubted), *self.rises]
         against = "; ".join(doubts)
+        reason = f" ({against})" if against else ""
+        if self.worse:
+            return f"{doubt}The new machine would fit worse than the one given: it is not written{reason}. {errors}"
         if verdict == REFUSED:
-            reason = f"The data speak against it: {against}." if against else "The machine stays as it is."
-            return f"{doubt}{reason} (--force, force=True, writes it all the same.) {errors}"
+            stays = f"The data speak against it: {against}." if against else "The machine stays as it is."
+            return f"{doubt}{stays} (--force, force=True, writes it all the same.) {errors}"
         unconfirmed = "" if self.described is None else f"But {self.described.reason}. "
         if verdict == FORCED:
-            reason = f" ({against})" if against else ""
             return f"{doubt}Added by force, although the data do not support it{reason}. {unconfirmed}{errors}"
         if not last.fit.names:
             return f"Strut law refitted; no effect added. {errors}"
