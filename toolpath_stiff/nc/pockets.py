@@ -81,7 +81,10 @@ def layers(top: float, bottom: float, most: float) -> list[float]:
 
 
 def clear(outer: Outline, step: float, height: float, feed: float, turn: int) -> Iterator[Cut]:
-    """Clear what an outer path of the tool's centre encloses, from the middle out, in rings at most `step` apart."""
+    """Clear what an outer path of the tool's centre encloses, from the middle out, in rings at most `step` apart.
+
+    Steps of more than sqrt(2) radii of the tool leave something between the sharp corners of rings.
+    """
     half, apart = min(outer.length, outer.width) / 2.0, (outer.length - outer.width) / 2.0
     for way in (turn, -turn, 0) if abs(apart) > LEAST_MM else ():
         yield outer.at(way * max(apart, 0.0), way * max(-apart, 0.0)), height, feed, None, 0
