@@ -23,7 +23,7 @@ LOGIC: dict[str, Callable[[bool, bool], bool]] = {
 }  # fmt: skip
 EQUAL = 1e-12  # relative, of two numbers that are the same (Job Planning, "Precision correction on comparison errors")
 FUNCTIONS: dict[str, Callable[..., float]] = {
-    **COMMON, "POT": lambda v: v * v, "TRUNC": whole, "MINVAL": min, "MAXVAL": max,
+    **COMMON, "POT": lambda v: v * v, "TRUNC": whole, "ROUNDUP": math.ceil, "MINVAL": min, "MAXVAL": max,
     "ROUND": lambda v: math.copysign(math.floor(abs(v) + 0.5), v),
     "ATAN2": lambda y, x: float(f"{math.degrees(math.atan2(y, x)):.12g}"),
     "BOUND": lambda least, most, v: max(least, min(most, v)),

@@ -37,6 +37,8 @@ BY_TEXT, PATH = ("CALL", "EXTCALL"), re.compile(r"^(?:.*/)?(?:_N_)?|[._][SM]PF$"
 TIMES = re.compile(r"P(?=\s*[=\d(])")
 PARAMETER = re.compile(r"(VAR\s+)?(REAL|INT|BOOL)\s+(\w+)\s*(\[[^]]*\])?(?:\s*=\s*([^,)]+))?", re.ASCII)
 ELEMENT, INDEX = re.compile(r"\[[\d,]+\]"), re.compile(r"(?<=[\[,])[A-Z_]\w*(?=[\],])", re.ASCII)
+DEFAULT, CASE_JUMP = re.compile(r"DEFAULT\b"), re.compile(r"\s*(GOTO[FB]?)\s+([A-Z_]\w*|:?\d+)\s*", re.ASCII)
+SET_HERE = re.compile(r"\$A_(?:OUTA?|DB[BWDR])\[|\$AC_(MARKER|PARAM)\[|\$AC_TIMER\[")  # 1: keeps its value
 SECTION = re.compile(r"(REPEATB?)\s+(\w+)(?:\s+(?!P\s*=)(\w+))?", re.ASCII)
 END_OF_FILE, SUFFIXES = "%_N__END_SPF", (".SPF", ".MPF", "")
 SEARCHED = ("$P_SEARCH", "$P_SEARCHL", "$P_ISTEST", "$P_SIM", "$P_DRYRUN")
@@ -145,6 +147,8 @@ class SiemensRun(ParametricRun):
         value = scope.get(name, scope.get(_array(name)))
         if name in self._texts:
             return self._texts[name]
+        if name == "$P_TOOLR" and not math.isnan(self.state.plain.radius):
+            return self.state.plain.radius / self.state.length_scale
         if name in SEARCHED:
             self.state.assume(RUNS)
             return False
@@ -160,8 +164,10 @@ class SiemensRun(ParametricRun):
     def _define(self, name: str, value: Value, column: int, kind: str) -> None:
         """Set a variable; `kind`: its type if it is declared here."""
         scope, name = self._scope(name)
-        array = _array(name)
-        if not (kind or scope is self.variables.common or scope.keys() & {name, array} or name in self._texts):
+        array, machine = _array(name), SET_HERE.match(name)
+        if machine is not None:
+            value = value if machine[1] else math.nan
+        elif not (kind or scope is self.variables.common or scope.keys() & {name, array} or name in self._texts):
             problem = f"{name} is no variable that is declared, and no address that is known"
             raise self._fail(self._at, problem, f"DEF REAL {name}, R parameters", column=column)
         if kind == "INT":
@@ -183,7 +189,15 @@ class SiemensRun(ParametricRun):
             plain.contour = draw(state, current, self._contour(current))
         with current.placing():
             carry_out(state, current)
-        slow = plain.modal or plain.held or plain.side or plain.unknown or plain.transformed or plain.base == "machine"
+        slow = (
+            plain.rounding
+            or plain.modal
+            or plain.held
+            or plain.side
+            or plain.unknown
+            or plain.transformed
+            or plain.base == "machine"
+        )
         self._plain = None if slow or (plain.renumbered and not state.absolute) else self._lexer
         called = any(level.stop < 0 for level in self._levels)
         return Flow.RETURN if current.flow is Flow.END and called else current.flow
@@ -245,6 +259,24 @@ class SiemensRun(ParametricRun):
         way, label = steering.label.split()
         stays = (steering.values and not self._value(steering)) or (way == "GOTOC" and label not in self._labels)
         return None if stays else self._to_label(row, way, label)
+
+    def _case(self, row: int, steering: Steering) -> int | None:
+        """CASE ... OF 1 GOTOF ONE 2 GOTOF TWO DEFAULT GOTOF REST: to the label of the value, else on."""
+        scanner, default = self._scanner(row, self._begins[row].end()), ""
+        scanner.part(NAME)
+        value = scanner.real()
+        wrong = scanner.part(NAME) != "OF"
+        while not wrong and not scanner.done:
+            case = scanner.part(DEFAULT) or scanner.real()
+            jump = CASE_JUMP.match(scanner.text, scanner.position)
+            wrong = jump is None
+            if jump is not None:
+                scanner.position = jump.end()
+                default = f"{jump[1]} {jump[2]}" if case == "DEFAULT" else default
+                if case == value:
+                    return self._to_label(row, jump[1], jump[2])
+        scanner.refuse_if(wrong, "CASE of another form", "CASE R1 OF 1 GOTOF ONE 2 GOTOF TWO DEFAULT GOTOF REST")
+        return self._to_label(row, *default.split()) if default else None
 
     def _scanner_of(self, row: int, text: str) -> SiemensScanner:
         """Scanner of an expression in text that is not part of the line."""
@@ -366,7 +398,7 @@ class SiemensRun(ParametricRun):
 
 
 SIEMENS_STEPS: dict[str, Step] = {
-    "JUMP": SiemensRun._jump_to, "FOR": SiemensRun._for, "ENDFOR": SiemensRun._end_for,
+    "JUMP": SiemensRun._jump_to, "CASE": SiemensRun._case, "FOR": SiemensRun._for, "ENDFOR": SiemensRun._end_for,
     "UNTIL": SiemensRun._until, "SECTION": SiemensRun._section, "CALL": SiemensRun._call_sub,
     "ENDLOOP": SiemensRun._back,
     **dict.fromkeys(("RET", "ENDPROC"), lambda run, row, steering: run._return(row, Flow.RETURN)),

@@ -26,13 +26,13 @@ SECTION = re.compile(r"REPEATB?\s+(?!P\s*=)[A-Z_:]\w*", re.ASCII)
 TYPES: dict[str, Value] = {"REAL": 0.0, "INT": 0.0, "BOOL": False, "CHAR": "", "STRING": ""}
 ADDRESSES = {
     *AXES, *VECTOR, *CORNERS, *WORDS, *"IJKFSTDMGH", "RP", "AP", "CR", "AR", "TURN", "I1", "J1", "K1", "RPL", "FP",
-    "X1", "Y1", "Z1",
+    "X1", "Y1", "Z1", "ANG", "RNDM",
 }  # fmt: skip
 STEERING = (
-    "ELSE", "ENDIF", "ENDWHILE", "LOOP", "ENDLOOP", "ENDFOR", "RET", "ENDPROC", "FOR", "IF", "WHILE", "UNTIL",
+    "ELSE", "ENDIF", "ENDWHILE", "LOOP", "ENDLOOP", "ENDFOR", "RET", "ENDPROC", "FOR", "IF", "WHILE", "UNTIL", "CASE",
 )  # fmt: skip
 OTHERWISE = {"T": "#", "RP": "PR", "AP": "PA", "CR": "R"}  # other names under which these words are kept
-SPINDLE = re.compile(r"([SM])1")  # address of the master spindle
+SPINDLE = re.compile(r"([SM])(\d+)")  # of a spindle; 1: the master spindle
 Define = Callable[[str, Value, int, str], None]  # sets a variable: name, value, column, its type if it is declared
 
 
@@ -90,6 +90,10 @@ def read_words(scanner: SiemensScanner, define: Define) -> list[Word]:
             words += _offset(scanner, index, column)
             continue
         spindle = SPINDLE.fullmatch(name)
+        if spindle and spindle[2] != "1":
+            scanner.result()
+            words.append(Word("SPOS", 0.0, column, scanner.text[begin : scanner.position]))
+            continue
         name = spindle[1] if spindle else name
         if name in REFUSED:
             if scanner.result():  # a zero switches it off
