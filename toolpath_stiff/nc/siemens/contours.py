@@ -39,6 +39,12 @@ def elements_of(drawn: State, block: CurrentBlock) -> list[Element]:
     return contour
 
 
+def contour_call(state: State, block: CurrentBlock, code: str) -> None:
+    """CYCLE62: names the contour of the cycles behind it; the run finds its blocks."""
+    for word in ("KNAME", "TYPE", "LAB1", "LAB2"):
+        block.take(word)
+
+
 def mill_contour(state: State, block: CurrentBlock, code: str) -> None:
     """CYCLE72: at each depth lead in on a line or an arc, along the contour, lead out; up to TOP in between."""
     values, radius = begin(state, block, code)

@@ -37,6 +37,7 @@ BY_TEXT, PATH = ("CALL", "EXTCALL"), re.compile(r"^(?:.*/)?(?:_N_)?|[._][SM]PF$"
 TIMES = re.compile(r"P(?=\s*[=\d(])")
 PARAMETER = re.compile(r"(VAR\s+)?(REAL|INT|BOOL)\s+(\w+)\s*(\[[^]]*\])?(?:\s*=\s*([^,)]+))?", re.ASCII)
 ELEMENT, INDEX = re.compile(r"\[[\d,]+\]"), re.compile(r"(?<=[\[,])[A-Z_]\w*(?=[\],])", re.ASCII)
+NAMED, LABELLED = 1.0, 2.0  # TYPE of CYCLE62: by the labels that the control makes of its name, by two labels
 DEFAULT, CASE_JUMP = re.compile(r"DEFAULT\b"), re.compile(r"\s*(GOTO[FB]?)\s+([A-Z_]\w*|:?\d+)\s*", re.ASCII)
 SET_HERE = re.compile(r"\$A_(?:OUTA?|DB[BWDR])\[|\$AC_(MARKER|PARAM)\[|\$AC_TIMER\[")  # 1: keeps its value
 SECTION = re.compile(r"(REPEATB?)\s+(\w+)(?:\s+(?!P\s*=)(\w+))?", re.ASCII)
@@ -62,6 +63,8 @@ class SiemensRun(ParametricRun):
         self._texts: dict[str, str] = {}
         self._whole: set[str] = set()  # variables of type INT
         self._homes = False
+        self._calls: list[tuple[int, int]] = []  # first and last row of the contours that CYCLE62 called
+        self._milled = False  # by a cycle behind them
         self._lex()
         plain, text = self.state.plain, "\n".join(map(code_text, self.lines))
         self._of_lathe = None if ALONG_Y.search(text) else OF_LATHES.search(text)
@@ -185,6 +188,9 @@ class SiemensRun(ParametricRun):
     def _execute(self, block: Block) -> Then:
         state, plain = self.state, self.state.plain
         current = sort_words(state, block, self.tally)
+        if "CYCLE62" in current.codes:
+            self._calls = [*self._calls * (not self._milled), self._contour_rows(current)]
+            self._milled = False
         if "CYCLE72" in current.codes:
             plain.contour = draw(state, current, self._contour(current))
         with current.placing():
@@ -202,15 +208,30 @@ class SiemensRun(ParametricRun):
         called = any(level.stop < 0 for level in self._levels)
         return Flow.RETURN if current.flow is Flow.END and called else current.flow
 
-    def _contour(self, block: CurrentBlock) -> Iterator[Block]:
-        """Blocks of the contour of CYCLE72: those of a subprogram ("NAME"), or between labels ("BEGIN:END")."""
-        block.refuse_if(block.take("KNAME") is None, None, "CYCLE72 without its contour", "its name, or labels")
-        first, _, last = (part.strip() for part in block.values["KNAME"].text.upper().partition(":"))
+    def _contour_rows(self, block: CurrentBlock) -> tuple[int, int]:
+        """First and last row of a contour: a subprogram ("NAME"), between labels ("BEGIN:END"), or as CYCLE62 says."""
+        given = {name: block.values[name].text.upper() for name in ("KNAME", "LAB1", "LAB2") if name in block.values}
+        first, _, last = (part.strip() for part in given.get("KNAME", "").partition(":"))
+        kind = block.values["TYPE"].value if "TYPE" in block.values else 0.0
+        if kind == NAMED and first:
+            first, last = f"E_LAB_A_{first}", f"E_LAB_E_{first}"
+        elif kind == LABELLED and not first:
+            first, last = given.get("LAB1", ""), given.get("LAB2", "")
+        block.refuse_if(kind not in (0.0, NAMED, LABELLED), "TYPE", "calls labels of a subprogram", "0, 1, 2")
+        block.refuse_if(not first, None, "CYCLE72 or CYCLE62 without its contour", "its name, or labels")
         if last:
             begin, stop = (self._to_label(self._at, "GOTO", label) for label in (first, last))
-        else:
-            begin = self._sub(first, self._at, block.block.words[0].column) + 1
-            stop = min(end for end in (*self._ends, len(self.lines)) if end > begin) - 1
+            return begin, stop
+        begin = self._sub(first, self._at, block.block.words[0].column) + 1
+        return begin, min(end for end in (*self._ends, len(self.lines)) if end > begin) - 1
+
+    def _contour(self, block: CurrentBlock) -> Iterator[Block]:
+        """Blocks of the contour of CYCLE72: its own, or that of the CYCLE62 before it."""
+        called = self._calls and not (block.values["KNAME"].text if "KNAME" in block.values else "")
+        block.refuse_if(called and len(self._calls) > 1, None, "CYCLE72 behind several CYCLE62", "one contour")
+        self._milled = self._milled or bool(called)
+        begin, stop = self._calls[-1] if called else self._contour_rows(block)
+        block.take("KNAME")
         for row in range(begin, stop + 1):
             steering = self._statement(row).steering
             if steering is not None and steering.kind == "RET":
