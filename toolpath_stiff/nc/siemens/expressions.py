@@ -17,6 +17,8 @@ from toolpath_stiff.nc.parametric.expressions import ARITHMETIC
 
 STRING = re.compile(r'"[^"]*"')
 NAME = re.compile(r"\$?[A-Z_]\w*", re.ASCII)
+# Of the machine: outputs, data of the PLC, timers; group 1: what keeps its value.
+SET_HERE = re.compile(r"\$A_(?:OUTA?|DB[BWDR])\[|\$AC_(MARKER|PARAM)\[|\$AC_TIMER\[")
 COMPARISONS: dict[str, Callable[[float, float], bool]] = {"<": lt, ">": gt, "<=": le, ">=": ge}
 LOGIC: dict[str, Callable[[bool, bool], bool]] = {
     "AND": lambda a, b: a and b, "OR": lambda a, b: a or b, "XOR": lambda a, b: a != b,

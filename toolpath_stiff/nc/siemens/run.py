@@ -20,11 +20,12 @@ from toolpath_stiff.nc.plain_words import PlainWords
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.run_records import Subprogram, Tally, beyond_the_end
 from toolpath_stiff.nc.siemens.blocks import carry_out, draw, sort_words
+from toolpath_stiff.nc.siemens.contours import contour_ends
 from toolpath_stiff.nc.siemens.coordinates import bring_back, modes_of
-from toolpath_stiff.nc.siemens.expressions import NAME, SiemensScanner
+from toolpath_stiff.nc.siemens.expressions import NAME, SET_HERE, SiemensScanner
 from toolpath_stiff.nc.siemens.programs import PROGRAM, heads_of, labels_of, plain_texts, programs_of
 from toolpath_stiff.nc.siemens.vocabulary import meaning_of
-from toolpath_stiff.nc.siemens.words import read_words, steering_of
+from toolpath_stiff.nc.siemens.words import chosen, read_words, steering_of
 from toolpath_stiff.nc.state import LATHE_HINT, CurrentBlock, Flow, Then
 from toolpath_stiff.nc.words import AXES, Block, Word
 
@@ -37,9 +38,6 @@ BY_TEXT, PATH = ("CALL", "EXTCALL"), re.compile(r"^(?:.*/)?(?:_N_)?|[._][SM]PF$"
 TIMES = re.compile(r"P(?=\s*[=\d(])")
 PARAMETER = re.compile(r"(VAR\s+)?(REAL|INT|BOOL)\s+(\w+)\s*(\[[^]]*\])?(?:\s*=\s*([^,)]+))?", re.ASCII)
 ELEMENT, INDEX = re.compile(r"\[[\d,]+\]"), re.compile(r"(?<=[\[,])[A-Z_]\w*(?=[\],])", re.ASCII)
-NAMED, LABELLED = 1.0, 2.0  # TYPE of CYCLE62: by the labels that the control makes of its name, by two labels
-DEFAULT, CASE_JUMP = re.compile(r"DEFAULT\b"), re.compile(r"\s*(GOTO[FB]?)\s+([A-Z_]\w*|:?\d+)\s*", re.ASCII)
-SET_HERE = re.compile(r"\$A_(?:OUTA?|DB[BWDR])\[|\$AC_(MARKER|PARAM)\[|\$AC_TIMER\[")  # 1: keeps its value
 SECTION = re.compile(r"(REPEATB?)\s+(\w+)(?:\s+(?!P\s*=)(\w+))?", re.ASCII)
 END_OF_FILE, SUFFIXES = "%_N__END_SPF", (".SPF", ".MPF", "")
 SEARCHED = ("$P_SEARCH", "$P_SEARCHL", "$P_ISTEST", "$P_SIM", "$P_DRYRUN")
@@ -209,16 +207,8 @@ class SiemensRun(ParametricRun):
         return Flow.RETURN if current.flow is Flow.END and called else current.flow
 
     def _contour_rows(self, block: CurrentBlock) -> tuple[int, int]:
-        """First and last row of a contour: a subprogram ("NAME"), between labels ("BEGIN:END"), or as CYCLE62 says."""
-        given = {name: block.values[name].text.upper() for name in ("KNAME", "LAB1", "LAB2") if name in block.values}
-        first, _, last = (part.strip() for part in given.get("KNAME", "").partition(":"))
-        kind = block.values["TYPE"].value if "TYPE" in block.values else 0.0
-        if kind == NAMED and first:
-            first, last = f"E_LAB_A_{first}", f"E_LAB_E_{first}"
-        elif kind == LABELLED and not first:
-            first, last = given.get("LAB1", ""), given.get("LAB2", "")
-        block.refuse_if(kind not in (0.0, NAMED, LABELLED), "TYPE", "calls labels of a subprogram", "0, 1, 2")
-        block.refuse_if(not first, None, "CYCLE72 or CYCLE62 without its contour", "its name, or labels")
+        """First and last row of a contour."""
+        first, last = contour_ends(block)
         if last:
             begin, stop = (self._to_label(self._at, "GOTO", label) for label in (first, last))
             return begin, stop
@@ -282,22 +272,8 @@ class SiemensRun(ParametricRun):
         return None if stays else self._to_label(row, way, label)
 
     def _case(self, row: int, steering: Steering) -> int | None:
-        """CASE ... OF 1 GOTOF ONE 2 GOTOF TWO DEFAULT GOTOF REST: to the label of the value, else on."""
-        scanner, default = self._scanner(row, self._begins[row].end()), ""
-        scanner.part(NAME)
-        value = scanner.real()
-        wrong = scanner.part(NAME) != "OF"
-        while not wrong and not scanner.done:
-            case = scanner.part(DEFAULT) or scanner.real()
-            jump = CASE_JUMP.match(scanner.text, scanner.position)
-            wrong = jump is None
-            if jump is not None:
-                scanner.position = jump.end()
-                default = f"{jump[1]} {jump[2]}" if case == "DEFAULT" else default
-                if case == value:
-                    return self._to_label(row, jump[1], jump[2])
-        scanner.refuse_if(wrong, "CASE of another form", "CASE R1 OF 1 GOTOF ONE 2 GOTOF TWO DEFAULT GOTOF REST")
-        return self._to_label(row, *default.split()) if default else None
+        way = chosen(self._scanner(row, self._begins[row].end()))
+        return self._to_label(row, *way) if way else None
 
     def _scanner_of(self, row: int, text: str) -> SiemensScanner:
         """Scanner of an expression in text that is not part of the line."""

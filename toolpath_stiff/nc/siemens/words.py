@@ -22,6 +22,7 @@ IN_BRACKETS = re.compile(r'\((?:[^()"]|"[^"]*"|\((?:[^()"]|"[^"]*")*\))*\)?')
 DIMENSION = re.compile(r"(IC|ACP|ACN|AC|DC)(?=\s*\()")
 PREFIX = {"IC": "I", "AC": "@", "DC": "DC", "ACP": "ACP", "ACN": "ACN", "": ""}
 JUMP = re.compile(r"(GOTO[FBC]?)\s+([A-Z_]\w*|:?\d+)\s*$", re.ASCII)
+DEFAULT, CASE_JUMP = re.compile(r"DEFAULT\b"), re.compile(r"\s*(GOTO[FB]?)\s+([A-Z_]\w*|:?\d+)\s*", re.ASCII)
 SECTION = re.compile(r"REPEATB?\s+(?!P\s*=)[A-Z_:]\w*", re.ASCII)
 TYPES: dict[str, Value] = {"REAL": 0.0, "INT": 0.0, "BOOL": False, "CHAR": "", "STRING": ""}
 ADDRESSES = {
@@ -54,6 +55,24 @@ def steering_of(scanner: SiemensScanner, evaluate: Callable[[int], Number]) -> S
     scanner.blanks()
     a_word = name in TABLE or name in REFUSED or name in ADDRESSES or scanner.begins("[", "=")
     return None if a_word else Steering("CALL", name, name, column)
+
+
+def chosen(scanner: SiemensScanner) -> tuple[str, str] | None:
+    """The way and the label that CASE ... OF 1 GOTOF ONE 2 GOTOF TWO DEFAULT GOTOF REST chooses; None: it goes on."""
+    scanner.part(NAME)
+    value, way = scanner.real(), None
+    wrong = scanner.part(NAME) != "OF"
+    while not wrong and not scanner.done:
+        case = scanner.part(DEFAULT) or scanner.real()
+        jump = CASE_JUMP.match(scanner.text, scanner.position)
+        wrong = jump is None
+        if jump is not None:
+            scanner.position = jump.end()
+            if case == value:
+                return jump[1], jump[2]
+            way = (jump[1], jump[2]) if case == "DEFAULT" else way
+    scanner.refuse_if(wrong, "CASE of another form", "CASE R1 OF 1 GOTOF ONE 2 GOTOF TWO DEFAULT GOTOF REST")
+    return way
 
 
 def read_words(scanner: SiemensScanner, define: Define) -> list[Word]:
