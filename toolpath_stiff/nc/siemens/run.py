@@ -12,7 +12,7 @@ from itertools import zip_longest
 from toolpath_stiff.nc.heidenhain.expressions import Value
 from toolpath_stiff.nc.heidenhain.statements import code_text
 from toolpath_stiff.nc.moves import Remark
-from toolpath_stiff.nc.parametric.run import ParametricRun, Step
+from toolpath_stiff.nc.parametric.run import Step
 from toolpath_stiff.nc.parametric.statements import Statement, Steering
 from toolpath_stiff.nc.parametric.variables import Values
 from toolpath_stiff.nc.plain_lines import PlainRun
@@ -23,9 +23,10 @@ from toolpath_stiff.nc.siemens.blocks import carry_out, draw, sort_words
 from toolpath_stiff.nc.siemens.contours import contour_ends
 from toolpath_stiff.nc.siemens.coordinates import bring_back, modes_of
 from toolpath_stiff.nc.siemens.expressions import NAME, SET_HERE, SiemensScanner
+from toolpath_stiff.nc.siemens.labels import LabelRun
 from toolpath_stiff.nc.siemens.programs import PROGRAM, heads_of, labels_of, plain_texts, programs_of
 from toolpath_stiff.nc.siemens.vocabulary import meaning_of
-from toolpath_stiff.nc.siemens.words import chosen, read_words, steering_of
+from toolpath_stiff.nc.siemens.words import read_words, steering_of
 from toolpath_stiff.nc.state import LATHE_HINT, CurrentBlock, Flow, Then
 from toolpath_stiff.nc.words import AXES, Block, Word
 
@@ -35,10 +36,8 @@ OF_LATHES = re.compile(r"\bG(?:18|96)(?!\d)|\bLIMS\b|\bDIAM(?:ON|90)\b")
 ALONG_Y = re.compile(r"(?<![A-Z_$])Y\s*[-+=\d.]")
 IN_MACHINE = re.compile(r"\b(?:SUPA|G53|G153)\b")
 BY_TEXT, PATH = ("CALL", "EXTCALL"), re.compile(r"^(?:.*/)?(?:_N_)?|[._][SM]PF$")
-TIMES = re.compile(r"P(?=\s*[=\d(])")
 PARAMETER = re.compile(r"(VAR\s+)?(REAL|INT|BOOL)\s+(\w+)\s*(\[[^]]*\])?(?:\s*=\s*([^,)]+))?", re.ASCII)
 ELEMENT, INDEX = re.compile(r"\[[\d,]+\]"), re.compile(r"(?<=[\[,])[A-Z_]\w*(?=[\],])", re.ASCII)
-SECTION = re.compile(r"(REPEATB?)\s+(\w+)(?:\s+(?!P\s*=)(\w+))?", re.ASCII)
 END_OF_FILE, SUFFIXES = "%_N__END_SPF", (".SPF", ".MPF", "")
 SEARCHED = ("$P_SEARCH", "$P_SEARCHL", "$P_ISTEST", "$P_SIM", "$P_DRYRUN")
 RUNS = "the program runs from its beginning, not searched, tested or simulated ($P_SEARCH, $P_ISTEST, $P_SIM)"
@@ -49,7 +48,7 @@ def _array(name: str) -> str:
     return name.partition("[")[0] + "[]" if ELEMENT.search(name) else ""
 
 
-class SiemensRun(ParametricRun):
+class SiemensRun(LabelRun):
     """A run of a program in Siemens' language; parameters as of `ProgramRun`.
 
     Subprograms are sections of the file (`%_N_NAME_SPF`), or files NAME.SPF in the folder of the controller.
@@ -193,15 +192,8 @@ class SiemensRun(ParametricRun):
             plain.contour = draw(state, current, self._contour(current))
         with current.placing():
             carry_out(state, current)
-        slow = (
-            plain.rounding
-            or plain.modal
-            or plain.held
-            or plain.side
-            or plain.unknown
-            or plain.transformed
-            or plain.base == "machine"
-        )
+        slow = plain.modal or plain.held or plain.side or plain.unknown or plain.transformed or plain.base == "machine"
+        slow = slow or plain.rounding > 0.0
         self._plain = None if slow or (plain.renumbered and not state.absolute) else self._lexer
         called = any(level.stop < 0 for level in self._levels)
         return Flow.RETURN if current.flow is Flow.END and called else current.flow
@@ -252,29 +244,6 @@ class SiemensRun(ParametricRun):
             raise self._fail(row, "SAVE brings back frames that the subprogram changed", "TRANS before its end")
         return self._leave(row) if self._levels else len(self.lines)
 
-    def _to_label(self, row: int, way: str, label: str) -> int:
-        """The line of a label: forward (GOTOF), backward (GOTOB), backward first (REPEAT), or forward first (GOTO)."""
-        first = max((begin for begin in self._ends if begin <= row), default=0)
-        stop = min((end for end in self._ends if end > first), default=len(self.lines))
-        rows = [place for place in self._labels.get(label, []) if first <= place < stop]
-        ahead, behind = [place for place in rows if place > row], [place for place in rows[::-1] if place <= row]
-        places = {"GOTOF": ahead, "GOTOB": behind, "REPEAT": behind + ahead}.get(way, ahead + behind)
-        if not places:
-            raise self._fail(row, f"{way} {label}: the program has no such label there", "LABEL: before a block")
-        to = places[0]
-        while self._levels and self._levels[-1].stop >= 0 and not self._levels[-1].first <= to < self._levels[-1].stop:
-            self._levels.pop()
-        return to
-
-    def _jump_to(self, row: int, steering: Steering) -> int | None:
-        way, label = steering.label.split()
-        stays = (steering.values and not self._value(steering)) or (way == "GOTOC" and label not in self._labels)
-        return None if stays else self._to_label(row, way, label)
-
-    def _case(self, row: int, steering: Steering) -> int | None:
-        way = chosen(self._scanner(row, self._begins[row].end()))
-        return self._to_label(row, *way) if way else None
-
     def _scanner_of(self, row: int, text: str) -> SiemensScanner:
         """Scanner of an expression in text that is not part of the line."""
         return SiemensScanner(text, [1] * (len(text) + 1), self._place(row), "", lookup=self._variable)
@@ -305,35 +274,6 @@ class SiemensRun(ParametricRun):
 
     def _until(self, row: int, steering: Steering) -> int | None:
         return None if self._value(steering) else self._structure.start[row] + 1
-
-    def _times(self, scanner: SiemensScanner) -> int:
-        """The number of runs: P after a call, or after a repeat."""
-        if not scanner.part(TIMES):
-            return 1
-        scanner.sign("=")
-        value = scanner.real()
-        scanner.refuse_if(value != int(value) or not 0 <= value <= 9999, f"P{value:g} repeats", "0 to 9999")
-        return int(value)
-
-    def _section(self, row: int, steering: Steering) -> int | None:
-        """REPEAT, REPEATB: run the blocks from a label on again."""
-        scanner = self._scanner(row, self._begins[row].end())
-        section = SECTION.match(scanner.text, scanner.position)
-        assert section is not None
-        scanner.position = section.end()
-        times = self._times(scanner)
-        scanner.refuse_if(not scanner.done, f"{scanner.rest()} behind {steering.shown}", "REPEAT LABEL P=2")
-        if not times:
-            return None
-        first = self._to_label(row, "REPEAT", section[2])
-        if section[3] or section[1] == "REPEATB":
-            stop = (self._to_label(first, "GOTO", section[3]) if section[3] else first) + 1
-        elif first < row:
-            stop = next((end for end in self._labels.get("ENDLABEL", []) if first < end < row), row)
-        else:
-            stop = self._to_label(first, "GOTOF", "ENDLABEL")
-        self._begin(Subprogram(section[2], first, row + 1, times - 1, stop=stop), row, steering.column)
-        return first
 
     def _call_sub(self, row: int, steering: Steering) -> int | None:
         name, scanner = steering.label, self._scanner(row, self._begins[row].end())

@@ -136,7 +136,7 @@ _ROWS: Rows = (
         ("HOLES1 HOLES2 CYCLE801 CYCLE802", cycles.pattern, "holes on a line, on a circle, in a grid, at points"),
     )),
     ("corner", f"{CYCLES}, Milling cycles", (
-        ("POCKET3 POCKET4", milling.mill_area, "rectangular pocket, circular pocket"),
+        ("POCKET1 POCKET2 POCKET3 POCKET4", milling.mill_area, "rectangular pocket, circular pocket"),
         ("CYCLE76 CYCLE77", milling.mill_area, "rectangular spigot, circular spigot"),
         ("CYCLE71 CYCLE61", milling.mill_area, "face"), ("CYCLE72", contours.mill_contour, "contour"),
         ("CYCLE62", contours.contour_call, "call of a contour"),
@@ -169,7 +169,7 @@ WORDS = frozenset((
 ))  # fmt: skip
 _BY_MOVES = "post the moves of the cycle"
 REFUSED = refused((
-    ("POCKET1 POCKET2 SLOT1 SLOT2 LONGHOLE CYCLE73 CYCLE74 CYCLE75 CYCLE63 CYCLE64 CYCLE70 CYCLE78 CYCLE79 "
+    ("SLOT1 SLOT2 LONGHOLE CYCLE73 CYCLE74 CYCLE75 CYCLE63 CYCLE64 CYCLE70 CYCLE78 CYCLE79 "
      "CYCLE90 CYCLE60 CYCLE899",
      "a cycle whose path the manual draws without numbers", _BY_MOVES, f"{CYCLES}, Milling cycles"),
     ("CYCLE92 CYCLE93 CYCLE94 CYCLE95 CYCLE96 CYCLE97 CYCLE98 CYCLE99 CYCLE930 CYCLE940 CYCLE951 CYCLE952 DIAMON "
