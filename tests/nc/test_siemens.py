@@ -203,6 +203,7 @@ REFUSALS = {
     "R1=1\nCASE R1 OF 1": "CASE of another form",
     "DEFINE A AS G0": "a macro of another form",
     "$AC_TIMER[1]=0\nR1=$AC_TIMER[1]": "is read before it is set",
+    "$TC_DP15[1,1]=1": "no variable that is declared",
     "$AA_OFF[X]=1": "no variable that is declared",
 }  # fmt: skip
 

@@ -25,6 +25,7 @@ from toolpath_stiff.nc.siemens.coordinates import bring_back, modes_of
 from toolpath_stiff.nc.siemens.expressions import NAME, SET_HERE, SiemensScanner
 from toolpath_stiff.nc.siemens.labels import LabelRun
 from toolpath_stiff.nc.siemens.programs import PROGRAM, heads_of, labels_of, plain_texts, programs_of
+from toolpath_stiff.nc.siemens.tools import set_data
 from toolpath_stiff.nc.siemens.vocabulary import meaning_of
 from toolpath_stiff.nc.siemens.words import read_words, steering_of
 from toolpath_stiff.nc.state import LATHE_HINT, CurrentBlock, Flow, Then
@@ -164,6 +165,8 @@ class SiemensRun(LabelRun):
     def _define(self, name: str, value: Value, column: int, kind: str) -> None:
         """Set a variable; `kind`: its type if it is declared here."""
         scope, name = self._scope(name)
+        if not isinstance(value, str) and set_data(self.state, name, value):
+            return
         array, machine = _array(name), SET_HERE.match(name)
         if machine is not None:
             value = value if machine[1] else math.nan
