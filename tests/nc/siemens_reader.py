@@ -37,8 +37,16 @@ class Reader:
     def __init__(self, text: str) -> None:
         self.lines = [re.sub(r"^N\d+ ", "", line) for line in text.splitlines()]
         self.names: dict[str, float] = {}
+        for row, line in enumerate(self.lines):  # macros
+            macro = re.fullmatch(r"DEFINE (\w+) AS (.*)", line)
+            if macro:
+                self.lines[row:] = [
+                    "LZ:",
+                    *(re.sub(rf"\b{macro[1]}\b", macro[2], rest) for rest in self.lines[row + 1 :]),
+                ]
         self.frame, self.tilt, self.place = np.eye(4), np.eye(4), np.zeros(3)
         self.mode, self.steps, self.pole, self.cycle, self.heading = "G1", False, np.zeros(2), None, None
+        self.rounding = 0.0
         self.waiting = None  # of a corner: start, apex, kind, size
         self.moves: list = []
         self.ended = False
@@ -85,6 +93,10 @@ class Reader:
                     self.names[name] = self.value(given)
                 self.run(head + 2, self.lines.index("M17", head))
                 self.names = kept | {name: v for name, v in self.names.items() if name[0] == "R"}
+            elif word == "CASE":
+                given, choices, other = re.match(r"CASE (\S+) OF (.*) DEFAULT GOTOF (\w+)", line).groups()
+                labels = {float(key): label for key, label in re.findall(r"(\S+) GOTOF (\w+)", choices)}
+                after = self.lines.index(f"{labels.get(self.value(given), other)}:")
             elif line == "M30":
                 self.ended = True
             elif not line.endswith(":"):
@@ -158,6 +170,12 @@ class Reader:
         for axis, letter in enumerate("XYZ"):
             if letter in words:
                 end[axis] = self.coordinate(words[letter], start[axis], self.steps)
+        if "ANG" in words:  # by the sine rule, in the triangle of the line and its two legs
+            known = 0 if "X" in words else 1
+            angle = math.radians(self.value(words["ANG"]))
+            leg = end[known] - start[known]
+            legs = math.sin(math.pi / 2 - angle), math.sin(angle)
+            end[1 - known] = start[1 - known] + leg * legs[1 - known] / legs[known]
         if {"RP", "AP"} & words.keys():
             out = start[:2] - self.pole
             radius = self.value(words["RP"]) if "RP" in words else np.hypot(*out)
@@ -188,8 +206,9 @@ class Reader:
                 self.line("G1", begin, leave)
             start, self.waiting = leave, None
         corner = next((kind for kind in ("RND", "CHR", "CHF") if kind in words), None)
-        if corner:
-            self.waiting = (start, end, corner, self.value(words[corner]))
+        self.rounding = self.value(words.get("RNDM", str(self.rounding)))
+        if corner or self.rounding:
+            self.waiting = (start, end, corner or "RND", self.value(words[corner]) if corner else self.rounding)
         else:
             self.line(mode, start, end)
         self.heading = (end - start)[:2] if np.hypot(*(end - start)[:2]) and end[2] == start[2] else None
@@ -363,7 +382,7 @@ def random_program(seed: int) -> str:
         )
 
     def statements(depth: int = 0) -> list[str]:
-        kind = chance.randrange(17 if depth < 2 else 9)
+        kind = chance.randrange(18 if depth < 2 else 9)
         if kind == 0:
             return [
                 f"G1 X{n()} Y{n()}",
@@ -381,6 +400,18 @@ def random_program(seed: int) -> str:
                 f"G1 X=IC({signs[0] * 20}) Y=IC({n(-3, 3)}) {corner}={n(0.5, 3)}",
                 f"X=IC({n(-5, 5)}) Y=IC({signs[1] * 20}) {chance.choice(('RND', 'CHR'))}={n(0.5, 3)}",
                 f"X=IC({signs[2] * 20}) Y=IC({n(-3, 3)})",
+            ]
+        if kind == 3 and chance.random() < 0.5:
+            axis, angle = chance.choice("XY"), chance.uniform(-180, 180)
+            way = {"X": math.cos, "Y": math.sin}[axis](math.radians(angle))
+            line = f"G1 {axis}=IC({math.copysign(chance.uniform(0.5, 2), way):.3f}) ANG={angle:.3f}"
+            sign = chance.choice((-1, 1))
+            return [
+                *([line] if abs(way) > 0.1 else []),
+                f"G1 X=IC(20) Y=IC({n(-3, 3)}) RNDM={n(0.5, 2)}",
+                f"X=IC({n(-5, 5)}) Y=IC({sign * 20}){chance.choice((' CHR=1.5', ''))}",
+                f"X=IC(-20) Y=IC({n(-3, 3)})",
+                f"RNDM=0 X=IC({n(-5, 5)}) Y=IC({-sign * 20})",
             ]
         if kind == 3:
             return [f"G1 {step('X', 'Y')}", f"CT {step('X', 'Y')}", f"{step('X', 'Y')}", "G1"]
@@ -437,10 +468,16 @@ def random_program(seed: int) -> str:
             return [f"{count}=0", f"LB{name}:", *inner, f"{count}={count}+1", f"IF {count}<2 GOTOB LB{name}"]
         if kind == 15:
             return [f"IF R1>{n()} GOTOF LC{name}", *inner, f"LC{name}:", away()]
+        if kind == 16:
+            choices = f"{chance.randrange(3)} GOTOF LD{name} 7 GOTOF LE{name} DEFAULT GOTOF LF{name}"
+            return [
+                *(f"CASE R9+R8-{chance.randrange(4)} OF {choices}", *inner, f"LD{name}:"),
+                *(f"G1 X=SIDE_{chance.choice('AB')}", f"LE{name}:", away(), f"LF{name}:", away()),
+            ]
         subs.append([f"%_N_SUB{name}_SPF", f"PROC SUB{name}(REAL P_A, REAL P_B)", "G1 X=P_A Y=P_B*2", *inner, "M17"])
         return [f"SUB{name}({n()},{value()})"]
 
-    lines += ["R1=3.5", "R2=-2", "R8=2", "R9=1"]
+    lines += ["R1=3.5", "R2=-2", "R8=2", "R9=1", f"DEFINE SIDE_A AS IC({n(5, 30)})", f"DEFINE SIDE_B AS {n()}"]
     for _ in range(chance.randrange(3, 9)):
         lines += statements()
     lines += ["M30", *(line for sub in subs for line in sub)]

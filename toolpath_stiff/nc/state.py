@@ -203,7 +203,7 @@ class Conversational:
         Siemens' programmable frame without its shift: turn, mirror image, scale.
     renumbered
         Axes whose numbers changed while they stood, until they are named.
-    side, entry, feed_place
+    side, entry, rounding, feed_place
         G40, G41, G42 that waits for the next straight move; KONT or G451 in force, "" for NORM and G450; CFC (F holds
         on arcs of contours), CFIN (on inside ones) or CFTCP in force, "": F is always the tool centre's.
     base
@@ -247,6 +247,7 @@ class Conversational:
     renumbered: set[int] = field(default_factory=set)
     side: str = ""
     entry: str = ""
+    rounding: float = 0.0
     feed_place: str = ""
     base: str = ""
     contour: list[Element] = field(default_factory=list)

@@ -10,7 +10,7 @@ from toolpath_stiff.nc.geometry import PLANES
 from toolpath_stiff.nc.run_records import Tally
 from toolpath_stiff.nc.siemens.contours import elements_of
 from toolpath_stiff.nc.siemens.cycles import repeated
-from toolpath_stiff.nc.siemens.motion import move, moves
+from toolpath_stiff.nc.siemens.motion import move, moves, round_all
 from toolpath_stiff.nc.siemens.vocabulary import REFUSED, TABLE, WORDS
 from toolpath_stiff.nc.state import STEPS, CurrentBlock, Flow, State
 from toolpath_stiff.nc.tables import Offsets
@@ -62,6 +62,7 @@ def carry_out(state: State, block: CurrentBlock) -> None:
             code.act(state, block, code.name)
     now = frames.to_program(frames.position)
     plain.renumbered |= {axis for axis in range(6) if abs(now[axis] - before[axis]) > 1e-9}
+    round_all(state, block)
     if moves(state, block):
         move(state, block)
         repeated(state, block)

@@ -15,6 +15,7 @@ from toolpath_stiff.nc.siemens.milling import FINISH, approached, begin, digit
 from toolpath_stiff.nc.state import CurrentBlock, State
 
 SIDES = {0.0: 0, 40.0: 0, 41.0: 1, 42.0: -1}  # of RL
+NAMED, LABELLED = 1.0, 2.0  # TYPE of CYCLE62: by the labels that the control makes of its name, by two labels
 STRAIGHT, HALF = 1.0, 3.0  # AS1, AS2; 2: a quarter of a circle
 
 
@@ -37,6 +38,26 @@ def elements_of(drawn: State, block: CurrentBlock) -> list[Element]:
     arc = not contour or trace[0].arc is not None
     block.refuse_if(arc, None, "CYCLE72 along no contour", "G1 to its start, and its elements")
     return contour
+
+
+def contour_call(state: State, block: CurrentBlock, code: str) -> None:
+    """CYCLE62: names the contour of the cycles behind it; the run finds its blocks."""
+    for word in ("KNAME", "TYPE", "LAB1", "LAB2"):
+        block.take(word)
+
+
+def contour_ends(block: CurrentBlock) -> tuple[str, str]:
+    """Subprogram of a contour and "", or its labels: of CYCLE72 ("NAME", "BEGIN:END"), or as CYCLE62 says by TYPE."""
+    given = {name: block.values[name].text.upper() for name in ("KNAME", "LAB1", "LAB2") if name in block.values}
+    first, _, last = (part.strip() for part in given.get("KNAME", "").partition(":"))
+    kind = block.values["TYPE"].value if "TYPE" in block.values else 0.0
+    block.refuse_if(kind not in (0.0, NAMED, LABELLED), "TYPE", "calls labels of a subprogram", "0, 1, 2")
+    if kind == NAMED and first:
+        first, last = f"E_LAB_A_{first}", f"E_LAB_E_{first}"
+    elif kind == LABELLED and not first:
+        first, last = given.get("LAB1", ""), given.get("LAB2", "")
+    block.refuse_if(not first, None, "CYCLE72 or CYCLE62 without its contour", "its name, or labels")
+    return first, last
 
 
 def mill_contour(state: State, block: CurrentBlock, code: str) -> None:

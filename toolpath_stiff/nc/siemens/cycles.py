@@ -19,6 +19,7 @@ from toolpath_stiff.units import SECONDS_PER_DAY
 
 _HEIGHTS, _MODES = "RTP RFP SDIS DP DPR", "GMODE DMODE AMODE"
 _THREAD = f"AXN PITA TECHNO VARI DAM VRT PITM PTAB PTABA {_MODES}"
+_OLD = "FFD FFP1 MID CDIR FAL VARI MIDF FFP2 SSF"
 _MILL, _SIGNS = "MID FAL FALD FFP1 FFD CDIR", f"UMODE FS ZFS {_MODES}"
 SIGNATURES = {
     "CYCLE81": f"{_HEIGHTS} DTB {_MODES}", "CYCLE82": f"{_HEIGHTS} DTB {_MODES}",
@@ -27,6 +28,7 @@ SIGNATURES = {
     "CYCLE840": f"{_HEIGHTS} DTB SDR SDAC ENC MPIT PIT {_THREAD.replace('VARI DAM VRT ', '')}",
     "CYCLE85": f"{_HEIGHTS} DTB FFR RFF {_MODES}", "CYCLE86": f"{_HEIGHTS} DTB SDIR RPA RPO RPAP POSS {_MODES}",
     "CYCLE87": f"{_HEIGHTS} SDIR", "CYCLE88": f"{_HEIGHTS} DTB SDIR", "CYCLE89": f"{_HEIGHTS} DTB {_MODES}",
+    "POCKET1": f"{_HEIGHTS} LENG WID CRAD _PA _PO STA {_OLD}", "POCKET2": f"{_HEIGHTS} PRAD _PA _PO {_OLD}",
     "POCKET3": f"RTP RFP SDIS DP LENG WID CRAD _PA _PO STA {_MILL} VARI MIDA AP1 AP2 AD RAD1 DP1 {_SIGNS}",
     "POCKET4": f"RTP RFP SDIS DP PRAD _PA _PO {_MILL} VARI MIDA AP1 AD RAD1 DP1 {_SIGNS}",
     "CYCLE76": f"{_HEIGHTS} LENG WID CRAD _PA _PO STA {_MILL} VARI AP1 AP2 {_SIGNS.removeprefix('UMODE ')}",
@@ -34,6 +36,7 @@ SIGNATURES = {
     "CYCLE71": "RTP RFP SDIS DP _PA _PO LENG WID STA MID MIDA FDP FALD FFP1 VARI FDP1",
     "CYCLE61": "RTP RFP SDIS DP _PA _PO LENG WID MID MIDA FALD FFP1 VARI LIM DMODE AMODE",
     "CYCLE72": f"KNAME RTP RFP SDIS DP MID FAL FALD FFP1 FFD VARI RL AS1 LP1 FF3 AS2 LP2 {_SIGNS}",
+    "CYCLE62": "KNAME TYPE LAB1 LAB2",
     "CYCLE801": "SPCA SPCO STA1 DIS1 DIS2 NUM1 NUM2 VARI UMODE ANG1 ANG2 HIDE NSP DMODE",
     "HOLES1": "SPCA SPCO STA1 FDIS DBH NUM VARI UMODE HIDE NSP DMODE",
     "HOLES2": "CPA CPO RAD STA1 INDA NUM VARI UMODE HIDE NSP DMODE",
@@ -41,18 +44,19 @@ SIGNATURES = {
     "CYCLE800": "FR TC ST MODE X0 Y0 Z0 A B C X1 Y1 Z1 DIR FRI DMODE",
     "WORKPIECE": "WP REF HOLD FORM MODE Z0 Z1 ZB X0 Y0 X1 Y1",
 }  # fmt: skip
-TEXTS = ("KNAME", "TC", "WP", "REF", "HOLD", "FORM", "HIDE", "PITM", "PTAB", "PTABA")
+TEXTS = ("KNAME", "LAB1", "LAB2", "TC", "WP", "REF", "HOLD", "FORM", "HIDE", "PITM", "PTAB", "PTABA")
 TAPS = ("CYCLE84", "CYCLE840")
 LENGTHS = frozenset((
     "RTP", "RFP", "SDIS", "DP", "DPR", "FDEP", "FDPR", "DAM", "PIT", "MDEP", "VRT", "DIS1", "FFR", "RFF", "SPCA",
     "SPCO", "FDIS", "DBH", "CPA", "CPO", "RAD", "LENG", "WID", "CRAD", "_PA", "_PO", "MID", "FAL", "FALD", "FFP1",
-    "FFD", "AP1", "AP2", "AD", "DP1", "PRAD", "FDP", "FDP1", "LP1", "LP2", "FF3", "DIS1", "DIS2",
+    "FFD", "AP1", "AP2", "AD", "DP1", "PRAD", "FDP", "FDP1", "LP1", "LP2", "FF3", "DIS1", "DIS2", "MIDF", "FFP2",
 ))  # fmt: skip
 # Pitches of coarse threads (ISO 261) by their size, mm.
 COARSE = {3: 0.5, 4: 0.7, 5: 0.8, 6: 1.0, 8: 1.25, 10: 1.5, 12: 1.75, 14: 2.0, 16: 2.0, 18: 2.5, 20: 2.5, 22: 2.5,
           24: 3.0, 27: 3.0, 30: 3.5, 33: 3.5, 36: 4.0, 39: 4.0, 42: 4.5, 45: 4.5, 48: 5.0}  # fmt: skip
 CHIP_BREAK_MM, AHEAD_MM, AHEAD_SHARE, MOST_AHEAD_MM = 1.0, 0.6, 1.0 / 50.0, 7.0  # of CYCLE83
 GRID = "the holes of CYCLE801 are drilled row by row, to and fro"
+SHORTER = "the pecks of CYCLE83 that are a share of the one before (DAM) end as those shortened by an amount"
 SHIFT = "the shift off the wall before the tool leaves the hole"
 
 
@@ -89,10 +93,17 @@ def cycle(state: State, block: CurrentBlock, code: str) -> None:
     block.refuse_if(shank, "GMODE", "counts the depth from a diameter or the shank", "0: from the tip")
     block.refuse_if(values.get("AXN", 3.0) not in (0.0, 3.0), "AXN", "is another axis than that of the tool", "none")
     if code == "CYCLE83":
+        counted = units[-5] == "1" and "FDPR" not in values and "FDEP" in values
+        block.refuse_if(counted, "FDEP", "counts from RFP", "FDPR")
         first = values["RFP"] - abs(values["FDPR"]) if values.get("FDPR") else values.get("FDEP", bottom)
         block.refuse_if(not bottom <= first < values["RFP"], None, "CYCLE83 whose first depth does not fit", "FDPR")
-        factor = values.get("DAM", 0.0) < 0.0 or (values.get("DAM") and units[-6:-4] != "00")
-        block.refuse_if(factor, "DAM", "is a factor of the pecks, or counts as AMODE says", "0, or mm")
+        less = values.get("DAM", 0.0)
+        if less < 0.0 or (less and units[-6] == "2"):  # the share of the stroke before
+            share = -less / state.length_scale if less < 0.0 else less / state.length_scale / 100.0
+            values |= {"SHARE": share, "DAM": 0.0, "MDEP": values.get("MDEP", 0.0) if share < 1.0 else 0.0}
+            wrong = not 0.0 < share <= 1.0 or (share < 1.0 and (values["MDEP"] <= 0.0 or units[-7] == "2"))
+            block.refuse_if(wrong, "DAM", "shortens the pecks without a least one in mm", "MDEP, or 100 per cent")
+            state.assume(SHORTER)
         least = min(values.get("MDEP") or values.get("DAM") or math.inf, values["RFP"] - first)
         block.refuse_if((first - bottom) / least > MOST_STROKES, None, "CYCLE83 with too many strokes", "a larger FDPR")
         values |= {"FIRST": first, "LEAST": least}
@@ -155,8 +166,8 @@ def strokes(values: Values, feed: float | None, speed: float, turns: float = 1.0
 
 
 def _pecks(values: Values, feed: float) -> Iterator[Stroke]:
-    """CYCLE83: pecks that get shorter by DAM, down to DAM, the last two alike; retract out, or by 1 mm, in between."""
-    depth, bottom, less = values["FIRST"], values["DP"], values.get("DAM", 0.0)
+    """CYCLE83: pecks that get shorter, the last two alike; retract out, or by 1 mm, in between."""
+    depth, bottom, less, part = values["FIRST"], values["DP"], values.get("DAM", 0.0), values.get("SHARE", 1.0)
     stroke, share, last = values["RFP"] - depth, values.get("FRF") or 1.0, values.get("DTD") or values.get("DTB", 0.0)
     ahead = values.get("DIS1") or min(max(AHEAD_MM, AHEAD_SHARE * (values["RFP"] - bottom)), MOST_AHEAD_MM)
     rate = feed * (share / 100.0 if share > 1.0 else share)  # above 1 it is per cent
@@ -168,9 +179,9 @@ def _pecks(values: Values, feed: float) -> Iterator[Stroke]:
         else:
             yield depth + (values.get("VRT") or CHIP_BREAK_MM), feed, 0.0
         left = depth - bottom
-        if less:
-            stroke = max(stroke - less, values["LEAST"])
-            stroke = left / 2.0 if stroke < left < 2.0 * stroke and stroke <= less else stroke
+        if less or part < 1.0:
+            stroke = max(stroke * part - less, values["LEAST"])
+            stroke = left / 2.0 if stroke < left < 2.0 * stroke and stroke <= (less or values["LEAST"]) else stroke
         depth -= min(stroke, left)
         yield depth, feed, values.get("DTB", 0.0) if depth > bottom + SAME_HEIGHT_MM else last
 

@@ -17,13 +17,15 @@ from toolpath_stiff.nc.parametric.expressions import ARITHMETIC
 
 STRING = re.compile(r'"[^"]*"')
 NAME = re.compile(r"\$?[A-Z_]\w*", re.ASCII)
+# Of the machine: outputs, data of the PLC, timers; group 1: what keeps its value.
+SET_HERE = re.compile(r"\$A_(?:OUTA?|DB[BWDR])\[|\$AC_(MARKER|PARAM)\[|\$AC_TIMER\[")
 COMPARISONS: dict[str, Callable[[float, float], bool]] = {"<": lt, ">": gt, "<=": le, ">=": ge}
 LOGIC: dict[str, Callable[[bool, bool], bool]] = {
     "AND": lambda a, b: a and b, "OR": lambda a, b: a or b, "XOR": lambda a, b: a != b,
 }  # fmt: skip
 EQUAL = 1e-12  # relative, of two numbers that are the same (Job Planning, "Precision correction on comparison errors")
 FUNCTIONS: dict[str, Callable[..., float]] = {
-    **COMMON, "POT": lambda v: v * v, "TRUNC": whole, "MINVAL": min, "MAXVAL": max,
+    **COMMON, "POT": lambda v: v * v, "TRUNC": whole, "ROUNDUP": math.ceil, "MINVAL": min, "MAXVAL": max,
     "ROUND": lambda v: math.copysign(math.floor(abs(v) + 0.5), v),
     "ATAN2": lambda y, x: float(f"{math.degrees(math.atan2(y, x)):.12g}"),
     "BOUND": lambda least, most, v: max(least, min(most, v)),

@@ -1,6 +1,6 @@
 """Milling cycles of Siemens' language, expanded to their moves: pockets, spigots, faces.
 
-SIEMENS, SINUMERIK 840D, Programming Guide Cycles (11/2002), "Milling cycles" (POCKET3, POCKET4, CYCLE71, CYCLE76,
+SIEMENS, SINUMERIK 840D, Programming Guide Cycles (11/2002), "Milling cycles" (POCKET1 to POCKET4, CYCLE71, CYCLE76,
 CYCLE77); 840D sl, Job Planning, "External programming of cycles" (CYCLE61, the digits of GMODE, DMODE and AMODE).
 Walls, floors and their allowances are the cycle's; the way over what lies between is ours, which is said once.
 """
@@ -23,7 +23,8 @@ OUR_WAY = (
 )
 STEP_SHARE = 0.8  # of the diameter: the step to the side where MIDA is not given
 LEAD_MM = 2.0  # radius on which a finishing cut reaches the wall of a pocket, if there is space
-ROUGH, FINISH, WALL = 1, 2, 4  # units of VARI
+BOTH, ROUGH, FINISH, WALL = 0, 1, 2, 4  # units of VARI
+OLD = ("POCKET1", "POCKET2")
 PLUNGES = ("", "", "helix", "ramp")  # tens of VARI of pockets: at rapid, at feed, and on the way down
 
 
@@ -44,7 +45,8 @@ def begin(state: State, block: CurrentBlock, code: str) -> tuple[Values, float]:
     heights = [values[name] for name in ("RTP", "TOP", "FLOOR", "DP")]
     crossed = heights != sorted(heights, reverse=True) or values["DP"] > values["RFP"]
     block.refuse_if(crossed, None, f"{code}: RTP, RFP, SDIS, DP and FALD cross", "RTP at the top, DP at the bottom")
-    known = digit(values["VARI"], 0) in (ROUGH, FINISH, WALL)
+    kind, kinds = digit(values["VARI"], 0), (ROUGH, FINISH, WALL)
+    known = values["VARI"] in (BOTH, ROUGH, FINISH) if code in OLD else kind in kinds
     block.refuse_if(not known, "VARI", "is no roughing (1) or finishing (2, 4)", "one of them")
     corners = any(digit(values["GMODE"], place) > 1 for place in range(6))
     block.refuse_if(corners, "GMODE", "measures from a corner, or mills what another tool has left", "11100")
@@ -63,7 +65,7 @@ def approached(state: State, values: Values, start: complex) -> list[Cut]:
 
 
 def mill_area(state: State, block: CurrentBlock, code: str) -> None:
-    """POCKET3, POCKET4, CYCLE61, CYCLE71, CYCLE76, CYCLE77: at the place that their parameters give."""
+    """POCKET1 to POCKET4, CYCLE61, CYCLE71, CYCLE76, CYCLE77: at the place that their parameters give."""
     values, radius = begin(state, block, code)
     path = list(PATHS[code](state, block, code, values, radius))
     mill(state, block, [*approached(state, values, path[0][0]), *path, (path[-1][0], values["RTP"], None, None, 0)])
@@ -73,7 +75,7 @@ def _outline(block: CurrentBlock, code: str, values: Values) -> Outline:
     """The rectangle or circle of a pocket or spigot."""
     length, width, corner = values["LENG"], values["WID"], values["CRAD"]
     if values["PRAD"]:  # of a spigot its diameter
-        length = width = values["PRAD"] * (2.0 if code == "POCKET4" else 1.0)
+        length = width = values["PRAD"] * (2.0 if code in ("POCKET2", "POCKET4") else 1.0)
         corner = length / 2.0
     fits = 0.0 <= corner <= min(length, width) / 2.0 + 1e-9 and min(length, width) > 0.0
     block.refuse_if(not fits, None, f"{code} measured from a corner, or of no size", "sizes above 0, from the middle")
@@ -122,6 +124,21 @@ def _pocket(state: State, block: CurrentBlock, code: str, values: Values, radius
         yield from pocket(wall, step, ([values["DP"]], *heights[1:]), (feed, down), turn, ("", 0.0, 0.0))
 
 
+def _old_pocket(state: State, block: CurrentBlock, code: str, values: Values, radius: float) -> Iterator[Cut]:
+    """POCKET1, POCKET2: rough with FAL at the wall, then finish the wall; VARI 0: both."""
+    kind, heights = values["VARI"], (values["TOP"], values["TOP"] - values["RFP"])
+    block.refuse_if(values["CDIR"] not in (2.0, 3.0), "CDIR", "is no milling direction", "2, 3")
+    block.refuse_if(values["SSF"], "SSF", "changes the speed within the cycle", "two calls: VARI 1, S, VARI 2")
+    if kind != FINISH:
+        yield from _pocket(state, block, code, values | {"VARI": 11.0}, radius)
+    if kind != ROUGH:
+        wall, feed = _outline(block, code, values).grown(-radius), values["FFP2"] or values["FFP1"]
+        lead = min(max(LEAD_MM, values["FAL"]), wall.length / 2.0, wall.width / 2.0)
+        block.refuse_if(lead < 0.0, None, f"{code} narrower than the tool", "a smaller tool")
+        floors = layers(values["TOP"], values["DP"], values["MIDF"] or values["MID"])
+        yield from edge(wall, (floors, *heights), (feed, values["FFD"]), _turn(state, block, values), lead)
+
+
 def _spigot(state: State, block: CurrentBlock, code: str, values: Values, radius: float) -> Iterator[Cut]:
     """Once round it at each depth: what the blank has beyond the tool's width is taken to be gone."""
     rough, outline = digit(values["VARI"], 0) == ROUGH, _outline(block, code, values)
@@ -157,5 +174,6 @@ def _face(state: State, block: CurrentBlock, code: str, values: Values, radius: 
 
 
 PATHS: dict[str, Callable[[State, CurrentBlock, str, Values, float], Iterator[Cut]]] = {
-    "POCKET3": _pocket, "POCKET4": _pocket, "CYCLE61": _face, "CYCLE71": _face, "CYCLE76": _spigot, "CYCLE77": _spigot,
+    "POCKET1": _old_pocket, "POCKET2": _old_pocket, "POCKET3": _pocket, "POCKET4": _pocket,
+    "CYCLE61": _face, "CYCLE71": _face, "CYCLE76": _spigot, "CYCLE77": _spigot,
 }  # fmt: skip

@@ -22,12 +22,14 @@ from toolpath_stiff.nc.words import AXES, Word
 
 POLAR = frozenset(("PR", "PA", "IPR", "IPA"))  # RP and AP are named as Heidenhain's PR and PA
 SHORTER = ("DC", "ACP", "ACN")
-POINTS = POLAR | {f"{kind}{letter}" for letter in AXES for kind in ("", "I", "@", *SHORTER)}
+POINTS = POLAR | {"ANG"} | {f"{kind}{letter}" for letter in AXES for kind in ("", "I", "@", *SHORTER)}
 CENTERS = frozenset((*"IJK", "@I", "@J", "@K", "R", "AR", "TURN"))  # CR is R
 VECTOR = ("A3", "B3", "C3")
 CORNERS = ("RND", "CHF", "CHR")
 SIDES = {"G40": "R0", "G41": "RL", "G42": "RR"}
 MACHINE = ("SUPA", "G53", "G153")
+CUTS = ("G1", "G2", "G3", "CT")  # between which RNDM rounds
+LEAST_ANGLE = 1e-4  # rad, of ANG from the axis that has no coordinate
 ENDS = "from tool axis to tool axis the tool goes on a great circle (ORIVECT), whatever leads it on the control"
 CHORDS = "a spline is taken as straight lines through its points"
 
@@ -52,11 +54,21 @@ def moves(state: State, block: CurrentBlock) -> bool:
     return bool(block.free & (POINTS | {*VECTOR} | (CENTERS if arcs else frozenset())))
 
 
+def round_all(state: State, block: CurrentBlock) -> None:
+    """RNDM: the radius of each corner between contour elements from here on; 0: none."""
+    if block.has("RNDM"):
+        early = state.plain.held is not None and not moves(state, block)
+        block.refuse_if(early, "RNDM", "between a corner (RND, CHF, CHR) and the move behind it", "the move")
+        size = (block.take("RNDM") or 0.0) * state.length_scale
+        block.refuse_if(size < 0.0, "RNDM", "is the radius of corners", "0 or more")
+        state.plain.rounding = size
+
+
 def move(state: State, block: CurrentBlock) -> None:
     """Carry out the motion of a block, with its corner and its change of compensation."""
     plain, mode = state.plain, state.motion or "G1"
     corner = next((letter for letter in CORNERS if block.has(letter)), "")
-    size = (block.take(corner) or 0.0) * state.length_scale if corner else 0.0
+    size = (block.take(corner) or 0.0) * state.length_scale if corner else plain.rounding * (mode in CUTS)
     block.refuse_if(size < 0.0, corner, "is the size of a corner", "more than 0")
     plain.to_corner = size > 0.0
     modal, alone = state.feed, block.take("FB")
@@ -69,7 +81,8 @@ def move(state: State, block: CurrentBlock) -> None:
         MOTIONS[mode](state, block, mode)
     state.feed = modal if alone is not None else state.feed
     if plain.to_corner and plain.held is not None:
-        head = Word("", size, block.values[corner].column, "RND" if corner == "RND" else "CHF")
+        column = block.values[corner].column if corner else block.block.words[0].column
+        head = Word("", size, column, "RND" if corner in ("", "RND") else "CHF")
         plain.corner = CurrentBlock(block.name, type(block.block)(block.line, (head,)))
         plain.corner.values |= {"size": head} | ({"across": head} if corner == "CHF" else {})
     plain.to_corner = False
@@ -113,11 +126,34 @@ def straight(state: State, block: CurrentBlock, code: str) -> None:
     if any(block.has(letter) for letter in VECTOR):
         _lean(state, block)
         return
+    _by_angle(state, block)
     in_the_plane = POLAR | {step + AXES[axis] for axis in (first, second) for step in ("", "I")}
     if plain.side and block.free & in_the_plane:
         mark(block, SIDES[plain.side], plain.side)
         plain.side = ""
     (contour.polar_line if block.free & POLAR else contour.line)(state, block, "L")
+
+
+def _by_angle(state: State, block: CurrentBlock) -> None:
+    """ANG: the line's angle from the first axis of the plane, and one of its end's two coordinates."""
+    plain, angle, plane = state.plain, block.take("ANG"), PLANES[state.plane][:2]
+    if angle is None:
+        return
+    given = [axis for axis in plane if block.free & {AXES[axis], f"I{AXES[axis]}"}]
+    block.refuse_if(
+        len(given) != 1 or block.free & POLAR, "ANG", "names no end", f"one of {AXES[plane[0]]}, {AXES[plane[1]]}"
+    )
+    (known,) = given
+    other, here, step = sum(plane) - known, present(state), block.values.get(f"I{AXES[known]}")
+    block.refuse_if(
+        other in plain.renumbered, "ANG", "right after another frame or tool length", f"{AXES[other]} before it"
+    )
+    way = step.value if step else block.values[AXES[known]].value - here[known] / state.length_scale
+    ahead = cmath.rect(1.0, math.radians(angle))
+    along, across = (ahead.real, ahead.imag) if known == plane[0] else (ahead.imag, ahead.real)
+    backward = abs(along) < LEAST_ANGLE or way * along < 0.0
+    block.refuse_if(backward, "ANG", "leads away from that end", "its direction")
+    mark(block, f"I{AXES[other]}", "ANG", way * across / along)
 
 
 def _lean(state: State, block: CurrentBlock) -> None:

@@ -10,12 +10,23 @@ from toolpath_stiff.nc.heidenhain.statements import code_text
 HEAD = re.compile(r"\s*(/\d?)?\s*(?:N(\d+)|(:\d+))?\s*(/\d?)?\s*(?:([A-Z_]{2}\w*)\s*:(?![=\d])\s*)?", re.ASCII)
 PROGRAM = re.compile(r"\s*%_N_(\w+?)_(?:MPF|SPF)\b|\s*(?:N\d+\s+)?PROC\s+(\w+)\s*(.*)", re.ASCII)
 PLAIN = re.compile(r"\s*(?:N\d+\s*)?((?:(?:G|[XYZABCIJKFS]=?|CR=)[-+]?[\d.]+\s*)*)(?:;.*)?", re.ASCII | re.IGNORECASE)
+MACRO = re.compile(r"\s*(?:N\d+\s*)?DEFINE\s+([A-Z_]{2}\w*)\s+AS\s+(.*)", re.ASCII)
+NAMES = re.compile(r'"[^"]*"|\$?[A-Z_]\w*', re.ASCII)
 REMARK = re.compile(r"^\s*(?:N\d+\s*)?\([^()]*\)$", re.ASCII)  # a comment as the ISO dialect and some posts write it
 
 
 def heads_of(lines: tuple[str, ...]) -> list[re.Match[str]]:
-    """Skip, number and label at the head of each line, matched in its code."""
-    heads = (HEAD.match(REMARK.sub("", code_text(line))) for line in lines)
+    """Skip, number and label at the head of each line, matched in its code; macros are replaced by what they are."""
+    macros, heads = dict[str, str](), list[re.Match[str] | None]()
+    for line in lines:
+        text = REMARK.sub("", code_text(line))
+        macro = MACRO.match(text) if "DEFINE" in text else None
+        if macro is not None:
+            macros[macro[1]] = macro[2]
+            text = ""
+        elif macros:
+            text = NAMES.sub(lambda name: macros.get(name[0], name[0]), text)
+        heads.append(HEAD.match(text))
     return [head for head in heads if head is not None]
 
 

@@ -12,7 +12,7 @@ from itertools import zip_longest
 from toolpath_stiff.nc.heidenhain.expressions import Value
 from toolpath_stiff.nc.heidenhain.statements import code_text
 from toolpath_stiff.nc.moves import Remark
-from toolpath_stiff.nc.parametric.run import ParametricRun, Step
+from toolpath_stiff.nc.parametric.run import Step
 from toolpath_stiff.nc.parametric.statements import Statement, Steering
 from toolpath_stiff.nc.parametric.variables import Values
 from toolpath_stiff.nc.plain_lines import PlainRun
@@ -20,9 +20,12 @@ from toolpath_stiff.nc.plain_words import PlainWords
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.run_records import Subprogram, Tally, beyond_the_end
 from toolpath_stiff.nc.siemens.blocks import carry_out, draw, sort_words
+from toolpath_stiff.nc.siemens.contours import contour_ends
 from toolpath_stiff.nc.siemens.coordinates import bring_back, modes_of
-from toolpath_stiff.nc.siemens.expressions import NAME, SiemensScanner
+from toolpath_stiff.nc.siemens.expressions import NAME, SET_HERE, SiemensScanner
+from toolpath_stiff.nc.siemens.labels import LabelRun
 from toolpath_stiff.nc.siemens.programs import PROGRAM, heads_of, labels_of, plain_texts, programs_of
+from toolpath_stiff.nc.siemens.tools import set_data
 from toolpath_stiff.nc.siemens.vocabulary import meaning_of
 from toolpath_stiff.nc.siemens.words import read_words, steering_of
 from toolpath_stiff.nc.state import LATHE_HINT, CurrentBlock, Flow, Then
@@ -34,10 +37,8 @@ OF_LATHES = re.compile(r"\bG(?:18|96)(?!\d)|\bLIMS\b|\bDIAM(?:ON|90)\b")
 ALONG_Y = re.compile(r"(?<![A-Z_$])Y\s*[-+=\d.]")
 IN_MACHINE = re.compile(r"\b(?:SUPA|G53|G153)\b")
 BY_TEXT, PATH = ("CALL", "EXTCALL"), re.compile(r"^(?:.*/)?(?:_N_)?|[._][SM]PF$")
-TIMES = re.compile(r"P(?=\s*[=\d(])")
 PARAMETER = re.compile(r"(VAR\s+)?(REAL|INT|BOOL)\s+(\w+)\s*(\[[^]]*\])?(?:\s*=\s*([^,)]+))?", re.ASCII)
 ELEMENT, INDEX = re.compile(r"\[[\d,]+\]"), re.compile(r"(?<=[\[,])[A-Z_]\w*(?=[\],])", re.ASCII)
-SECTION = re.compile(r"(REPEATB?)\s+(\w+)(?:\s+(?!P\s*=)(\w+))?", re.ASCII)
 END_OF_FILE, SUFFIXES = "%_N__END_SPF", (".SPF", ".MPF", "")
 SEARCHED = ("$P_SEARCH", "$P_SEARCHL", "$P_ISTEST", "$P_SIM", "$P_DRYRUN")
 RUNS = "the program runs from its beginning, not searched, tested or simulated ($P_SEARCH, $P_ISTEST, $P_SIM)"
@@ -48,7 +49,7 @@ def _array(name: str) -> str:
     return name.partition("[")[0] + "[]" if ELEMENT.search(name) else ""
 
 
-class SiemensRun(ParametricRun):
+class SiemensRun(LabelRun):
     """A run of a program in Siemens' language; parameters as of `ProgramRun`.
 
     Subprograms are sections of the file (`%_N_NAME_SPF`), or files NAME.SPF in the folder of the controller.
@@ -60,6 +61,8 @@ class SiemensRun(ParametricRun):
         self._texts: dict[str, str] = {}
         self._whole: set[str] = set()  # variables of type INT
         self._homes = False
+        self._calls: list[tuple[int, int]] = []  # first and last row of the contours that CYCLE62 called
+        self._milled = False  # by a cycle behind them
         self._lex()
         plain, text = self.state.plain, "\n".join(map(code_text, self.lines))
         self._of_lathe = None if ALONG_Y.search(text) else OF_LATHES.search(text)
@@ -145,6 +148,8 @@ class SiemensRun(ParametricRun):
         value = scope.get(name, scope.get(_array(name)))
         if name in self._texts:
             return self._texts[name]
+        if name == "$P_TOOLR" and not math.isnan(self.state.plain.radius):
+            return self.state.plain.radius / self.state.length_scale
         if name in SEARCHED:
             self.state.assume(RUNS)
             return False
@@ -160,8 +165,12 @@ class SiemensRun(ParametricRun):
     def _define(self, name: str, value: Value, column: int, kind: str) -> None:
         """Set a variable; `kind`: its type if it is declared here."""
         scope, name = self._scope(name)
-        array = _array(name)
-        if not (kind or scope is self.variables.common or scope.keys() & {name, array} or name in self._texts):
+        if not isinstance(value, str) and set_data(self.state, name, value):
+            return
+        array, machine = _array(name), SET_HERE.match(name)
+        if machine is not None:
+            value = value if machine[1] else math.nan
+        elif not (kind or scope is self.variables.common or scope.keys() & {name, array} or name in self._texts):
             problem = f"{name} is no variable that is declared, and no address that is known"
             raise self._fail(self._at, problem, f"DEF REAL {name}, R parameters", column=column)
         if kind == "INT":
@@ -179,24 +188,35 @@ class SiemensRun(ParametricRun):
     def _execute(self, block: Block) -> Then:
         state, plain = self.state, self.state.plain
         current = sort_words(state, block, self.tally)
+        if "CYCLE62" in current.codes:
+            self._calls = [*self._calls * (not self._milled), self._contour_rows(current)]
+            self._milled = False
         if "CYCLE72" in current.codes:
             plain.contour = draw(state, current, self._contour(current))
         with current.placing():
             carry_out(state, current)
         slow = plain.modal or plain.held or plain.side or plain.unknown or plain.transformed or plain.base == "machine"
+        slow = slow or plain.rounding > 0.0
         self._plain = None if slow or (plain.renumbered and not state.absolute) else self._lexer
         called = any(level.stop < 0 for level in self._levels)
         return Flow.RETURN if current.flow is Flow.END and called else current.flow
 
-    def _contour(self, block: CurrentBlock) -> Iterator[Block]:
-        """Blocks of the contour of CYCLE72: those of a subprogram ("NAME"), or between labels ("BEGIN:END")."""
-        block.refuse_if(block.take("KNAME") is None, None, "CYCLE72 without its contour", "its name, or labels")
-        first, _, last = (part.strip() for part in block.values["KNAME"].text.upper().partition(":"))
+    def _contour_rows(self, block: CurrentBlock) -> tuple[int, int]:
+        """First and last row of a contour."""
+        first, last = contour_ends(block)
         if last:
             begin, stop = (self._to_label(self._at, "GOTO", label) for label in (first, last))
-        else:
-            begin = self._sub(first, self._at, block.block.words[0].column) + 1
-            stop = min(end for end in (*self._ends, len(self.lines)) if end > begin) - 1
+            return begin, stop
+        begin = self._sub(first, self._at, block.block.words[0].column) + 1
+        return begin, min(end for end in (*self._ends, len(self.lines)) if end > begin) - 1
+
+    def _contour(self, block: CurrentBlock) -> Iterator[Block]:
+        """Blocks of the contour of CYCLE72: its own, or that of the CYCLE62 before it."""
+        called = self._calls and not (block.values["KNAME"].text if "KNAME" in block.values else "")
+        block.refuse_if(called and len(self._calls) > 1, None, "CYCLE72 behind several CYCLE62", "one contour")
+        self._milled = self._milled or bool(called)
+        begin, stop = self._calls[-1] if called else self._contour_rows(block)
+        block.take("KNAME")
         for row in range(begin, stop + 1):
             steering = self._statement(row).steering
             if steering is not None and steering.kind == "RET":
@@ -226,25 +246,6 @@ class SiemensRun(ParametricRun):
         if self._levels and self._levels[-1].kept and not bring_back(self.state, self._levels[-1].kept):
             raise self._fail(row, "SAVE brings back frames that the subprogram changed", "TRANS before its end")
         return self._leave(row) if self._levels else len(self.lines)
-
-    def _to_label(self, row: int, way: str, label: str) -> int:
-        """The line of a label: forward (GOTOF), backward (GOTOB), backward first (REPEAT), or forward first (GOTO)."""
-        first = max((begin for begin in self._ends if begin <= row), default=0)
-        stop = min((end for end in self._ends if end > first), default=len(self.lines))
-        rows = [place for place in self._labels.get(label, []) if first <= place < stop]
-        ahead, behind = [place for place in rows if place > row], [place for place in rows[::-1] if place <= row]
-        places = {"GOTOF": ahead, "GOTOB": behind, "REPEAT": behind + ahead}.get(way, ahead + behind)
-        if not places:
-            raise self._fail(row, f"{way} {label}: the program has no such label there", "LABEL: before a block")
-        to = places[0]
-        while self._levels and self._levels[-1].stop >= 0 and not self._levels[-1].first <= to < self._levels[-1].stop:
-            self._levels.pop()
-        return to
-
-    def _jump_to(self, row: int, steering: Steering) -> int | None:
-        way, label = steering.label.split()
-        stays = (steering.values and not self._value(steering)) or (way == "GOTOC" and label not in self._labels)
-        return None if stays else self._to_label(row, way, label)
 
     def _scanner_of(self, row: int, text: str) -> SiemensScanner:
         """Scanner of an expression in text that is not part of the line."""
@@ -276,35 +277,6 @@ class SiemensRun(ParametricRun):
 
     def _until(self, row: int, steering: Steering) -> int | None:
         return None if self._value(steering) else self._structure.start[row] + 1
-
-    def _times(self, scanner: SiemensScanner) -> int:
-        """The number of runs: P after a call, or after a repeat."""
-        if not scanner.part(TIMES):
-            return 1
-        scanner.sign("=")
-        value = scanner.real()
-        scanner.refuse_if(value != int(value) or not 0 <= value <= 9999, f"P{value:g} repeats", "0 to 9999")
-        return int(value)
-
-    def _section(self, row: int, steering: Steering) -> int | None:
-        """REPEAT, REPEATB: run the blocks from a label on again."""
-        scanner = self._scanner(row, self._begins[row].end())
-        section = SECTION.match(scanner.text, scanner.position)
-        assert section is not None
-        scanner.position = section.end()
-        times = self._times(scanner)
-        scanner.refuse_if(not scanner.done, f"{scanner.rest()} behind {steering.shown}", "REPEAT LABEL P=2")
-        if not times:
-            return None
-        first = self._to_label(row, "REPEAT", section[2])
-        if section[3] or section[1] == "REPEATB":
-            stop = (self._to_label(first, "GOTO", section[3]) if section[3] else first) + 1
-        elif first < row:
-            stop = next((end for end in self._labels.get("ENDLABEL", []) if first < end < row), row)
-        else:
-            stop = self._to_label(first, "GOTOF", "ENDLABEL")
-        self._begin(Subprogram(section[2], first, row + 1, times - 1, stop=stop), row, steering.column)
-        return first
 
     def _call_sub(self, row: int, steering: Steering) -> int | None:
         name, scanner = steering.label, self._scanner(row, self._begins[row].end())
@@ -366,7 +338,7 @@ class SiemensRun(ParametricRun):
 
 
 SIEMENS_STEPS: dict[str, Step] = {
-    "JUMP": SiemensRun._jump_to, "FOR": SiemensRun._for, "ENDFOR": SiemensRun._end_for,
+    "JUMP": SiemensRun._jump_to, "CASE": SiemensRun._case, "FOR": SiemensRun._for, "ENDFOR": SiemensRun._end_for,
     "UNTIL": SiemensRun._until, "SECTION": SiemensRun._section, "CALL": SiemensRun._call_sub,
     "ENDLOOP": SiemensRun._back,
     **dict.fromkeys(("RET", "ENDPROC"), lambda run, row, steering: run._return(row, Flow.RETURN)),

@@ -5,15 +5,31 @@ SIEMENS, SINUMERIK 840D sl, Programming Manual Fundamentals, "Tool change", "Too
 """
 
 import math
+import re
 
 from toolpath_stiff.nc.codes.tools import change_tool
 from toolpath_stiff.nc.heidenhain.points import outside_contour
 from toolpath_stiff.nc.heidenhain.tools import tool_number
 from toolpath_stiff.nc.state import CurrentBlock, State
-from toolpath_stiff.nc.tables import tool_of
+from toolpath_stiff.nc.tables import ToolEntry, tool_of
 
 ONE_EDGE = "cutting edges beyond D1 have the length and the diameter of the tool in the table"
+TOOL_DATA = re.compile(r"\$TC_DP([1236])\[(\d+),1\]")  # type, edge position, length, radius of the first edge
 BY_T = "T changes the tool: the program has no M6"
+
+
+def set_data(state: State, name: str, value: float) -> bool:
+    """Set a tool's length ($TC_DP3) or radius ($TC_DP6), mm, if a variable is one; True if it is data of a tool."""
+    data = TOOL_DATA.fullmatch(name)
+    if data is None:
+        return False
+    state.tools = {} if state.tools is None else state.tools
+    entry = state.tools.setdefault(int(data[2]), ToolEntry(int(data[2])))
+    if data[1] == "3":
+        entry.length = value
+    elif data[1] == "6":
+        entry.diameter = 2.0 * value
+    return True
 
 
 def select(state: State, block: CurrentBlock, code: str) -> None:

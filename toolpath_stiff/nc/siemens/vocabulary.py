@@ -39,8 +39,10 @@ def side(state: State, block: CurrentBlock, code: str) -> None:
 
 
 def entry(state: State, block: CurrentBlock, code: str) -> None:
-    """NORM, G450, KONT, G451: how a compensated contour is entered and how it rounds outside corners."""
-    state.plain.entry = "" if code in ("NORM", "G450") else code
+    """Entry, outside corners and kind of compensation: `plain.entry` names those in force that are not supported."""
+    group = next(names for names in _ENTRIES if code in names)
+    others = [name for name in state.plain.entry.split() if name not in group]
+    state.plain.entry = " ".join(others + [code] * (code not in _ENTERED))
     block.refuse_if(state.cutter is not None and state.plain.entry, code, "while G41 or G42 is on", "NORM and G450")
 
 
@@ -75,6 +77,8 @@ def back(state: State, block: CurrentBlock, code: str) -> None:
     block.flow = Flow.RETURN
 
 
+_ENTRIES = ("NORM", "KONT", "KONTC", "KONTT"), ("G450", "G451"), ("CUT2D", "CUT2DF", "CUT3DC", "CUT3DF", "CUT3DFS")
+_ENTERED = ("NORM", "G450", "CUT2D", "CUT2DF")
 _MOTION = ("G0", "G1", "G2", "G3", "CIP", "CT", "ASPLINE", "CSPLINE")
 _FRAMES = f"{BASICS}, Coordinate transformations (frames)"
 _ROWS: Rows = (
@@ -102,7 +106,8 @@ _ROWS: Rows = (
         ("G42", side, "cutter compensation, tool on the right"),
     )),
     ("path control", f"{BASICS}, Tool radius compensation", (
-        ("NORM KONT G450 G451", entry, "how a compensated contour begins, and its outside corners"),
+        ("NORM KONT KONTC KONTT G450 G451", entry, "how a compensated contour begins, and its outside corners"),
+        ("CUT2D CUT2DF CUT3DC CUT3DF CUT3DFS", entry, "in a plane, or in space"),
     )),
     ("path control", f"{BASICS}, Feedrate optimization for curved path sections", (
         ("CFC CFIN CFTCP", feed_place, "where F holds beside arcs"),
@@ -131,9 +136,10 @@ _ROWS: Rows = (
         ("HOLES1 HOLES2 CYCLE801 CYCLE802", cycles.pattern, "holes on a line, on a circle, in a grid, at points"),
     )),
     ("corner", f"{CYCLES}, Milling cycles", (
-        ("POCKET3 POCKET4", milling.mill_area, "rectangular pocket, circular pocket"),
+        ("POCKET1 POCKET2 POCKET3 POCKET4", milling.mill_area, "rectangular pocket, circular pocket"),
         ("CYCLE76 CYCLE77", milling.mill_area, "rectangular spigot, circular spigot"),
         ("CYCLE71 CYCLE61", milling.mill_area, "face"), ("CYCLE72", contours.mill_contour, "contour"),
+        ("CYCLE62", contours.contour_call, "call of a contour"),
     )),
     ("corner", f"{MANUAL}, Operating, Blank input", (("WORKPIECE", tools.blank, "blank"),)),
 )  # fmt: skip
@@ -143,26 +149,27 @@ LISTED = {
         "how the control plans ahead: the path is taken as programmed":
             "G9 G60 G64 G601 G602 G603 G641 G642 G643 G644 G645 G62 G621 BRISK BRISKA SOFT SOFTA DRIVE FFWON FFWOF "
             "COMPON COMPCURV COMPCAD COMPSURF COMPOF CYCLE832 DYNNORM DYNPOS DYNROUGH DYNSEMIFIN DYNFINISH DYNPREC "
-            "FIFOCTRL STARTFIFO STOPFIFO RTLION RTLIOF UPATH SPATH FNORM FLIN FCUB CUT2D "
+            "FIFOCTRL STARTFIFO STOPFIFO RTLION RTLIOF UPATH SPATH FNORM FLIN FCUB FENDNORM "
             "CPRECON CPRECOF FGROUP ORISON ORISOF ORIWKS ORIMKS ORIRESET CDON CDOF CDOF2 G460 G461 G462 OST OSOF G290 "
-            "HIGH_SPEED ORIVECT ORIPLANE ORIAXES",
+            "HIGH_SPEED ORIVECT ORIPLANE ORIAXES ORIEULER ORIRPY ORIRPY2 ORIC ORID BNAT BTAN BAUTO ENAT ETAN EAUTO CP",
         "message, stop of the look-ahead, display":
             "MSG STOPRE GROUP_BEGIN GROUP_END GROUP_ADDEND DISPLOF DISPLON NEWCONF WRITE SETAL PARAM_END EXTERN WAITM "
-            "SETMS STOPREOF SAVE SBLOF SBLON ENDLABEL",
+            "SETM CLEARM SETMS STOPREOF SAVE SBLOF SBLON ENDLABEL",
         "limits of the working area and of the spindle": "G25 G26 WALIMON WALIMOF LIMS",
         "none is on, since switching it on is refused": "DIAMOF PAROTOF TOROTOF TOFRAMEOF TCOABS TMOF CUTMOF G49",
         "a tool length of the ISO dialect: D has it": "G43",
-        "a spindle or an axis that is told apart": "SPOS SPOSA SPCON SPCOF M70",
+        "a spindle or an axis that is told apart":
+            "SPOS SPOSA SPCON SPCOF M70 WAITP WAITS GET GETD RELEASE TANGOF GWPSOF",
     }.items()
     for name in names.split()
 }  # fmt: skip
 WORDS = frozenset((
     "ADIS", "ADISPOS", "SPOS", "SPOSA", "OVR", "OVRRAP", "FGREF", "CTOL", "OTOL", "ACC", "H", "FRC", "FL", "LIMS",
-    "ATOL", "VELOLIM", "ACCLIM", "JERKLIM", "FA", "STOLF", "FB",
+    "ATOL", "VELOLIM", "ACCLIM", "JERKLIM", "VELOLIMA", "ACCLIMA", "JERKLIMA", "FA", "STOLF", "FB",
 ))  # fmt: skip
 _BY_MOVES = "post the moves of the cycle"
 REFUSED = refused((
-    ("POCKET1 POCKET2 SLOT1 SLOT2 LONGHOLE CYCLE73 CYCLE74 CYCLE75 CYCLE62 CYCLE63 CYCLE64 CYCLE70 CYCLE78 CYCLE79 "
+    ("SLOT1 SLOT2 LONGHOLE CYCLE73 CYCLE74 CYCLE75 CYCLE63 CYCLE64 CYCLE70 CYCLE78 CYCLE79 "
      "CYCLE90 CYCLE60 CYCLE899",
      "a cycle whose path the manual draws without numbers", _BY_MOVES, f"{CYCLES}, Milling cycles"),
     ("CYCLE92 CYCLE93 CYCLE94 CYCLE95 CYCLE96 CYCLE97 CYCLE98 CYCLE99 CYCLE930 CYCLE940 CYCLE951 CYCLE952 DIAMON "
@@ -175,17 +182,15 @@ REFUSED = refused((
     ("G58 G59", "an offset axis by axis", "TRANS, ATRANS", _FRAMES),
     ("ROTS AROTS CROTS", "a rotation by spatial angles", "ROT, AROT", _FRAMES),
     ("PRESETON PRESETONS", "another number of the machine's axis", "TRANS", f"{PLANNING}, Preset offset"),
-    ("ANG", "a line by its angle", "X, Y", f"{BASICS}, Motion commands"),
-    ("DEFINE", "a macro", "what it stands for", f"{PLANNING}, Macro technique"),
+    ("DEFINE", "a macro of another form", "DEFINE NAME AS ...", f"{PLANNING}, Macro technique"),
     ("G63 G331 G332", "tapping without a cycle", "CYCLE84", f"{BASICS}, Tapping"),
     ("G140 G141 G142 G143 G147 G148 G247 G248 G340 G341 G347 G348", "smooth approach and retraction",
      "post its moves", f"{BASICS}, Smooth approach and retraction"),
     ("G291", "the ISO dialect", "read it as G code: --dialect fanuc", f"{MANUAL}, ISO Milling"),
     ("DISC", "corners between an arc and an intersection", "DISC=0", f"{BASICS}, Tool radius compensation"),
-    ("RNDM", "rounding of all corners", "RND= at each of them", f"{BASICS}, Chamfer, rounding"),
     ("A2 B2 C2 A4 B4 C4 A5 B5 C5 LEAD TILT THETA OFFN OEMIPO1", "an orientation given otherwise", "A3, B3, C3",
      f"{PLANNING}, Orientation"),
-    ("WHEN WHENEVER EVERY DO ID IDS CASE", "a synchronised action, or a choice", "IF with GOTOF", PLANNING),
+    ("WHEN WHENEVER EVERY DO ID IDS", "a synchronised action", "IF with GOTOF", PLANNING),
     ("PCALL CALLPATH ISOCALL", "a call by path", "the subprogram's name, with --subprograms",
      f"{PLANNING}, Subprogram technique"),
 ))  # fmt: skip

@@ -22,17 +22,18 @@ IN_BRACKETS = re.compile(r'\((?:[^()"]|"[^"]*"|\((?:[^()"]|"[^"]*")*\))*\)?')
 DIMENSION = re.compile(r"(IC|ACP|ACN|AC|DC)(?=\s*\()")
 PREFIX = {"IC": "I", "AC": "@", "DC": "DC", "ACP": "ACP", "ACN": "ACN", "": ""}
 JUMP = re.compile(r"(GOTO[FBC]?)\s+([A-Z_]\w*|:?\d+)\s*$", re.ASCII)
+DEFAULT, CASE_JUMP = re.compile(r"DEFAULT\b"), re.compile(r"\s*(GOTO[FB]?)\s+([A-Z_]\w*|:?\d+)\s*", re.ASCII)
 SECTION = re.compile(r"REPEATB?\s+(?!P\s*=)[A-Z_:]\w*", re.ASCII)
 TYPES: dict[str, Value] = {"REAL": 0.0, "INT": 0.0, "BOOL": False, "CHAR": "", "STRING": ""}
 ADDRESSES = {
     *AXES, *VECTOR, *CORNERS, *WORDS, *"IJKFSTDMGH", "RP", "AP", "CR", "AR", "TURN", "I1", "J1", "K1", "RPL", "FP",
-    "X1", "Y1", "Z1",
+    "X1", "Y1", "Z1", "ANG", "RNDM",
 }  # fmt: skip
 STEERING = (
-    "ELSE", "ENDIF", "ENDWHILE", "LOOP", "ENDLOOP", "ENDFOR", "RET", "ENDPROC", "FOR", "IF", "WHILE", "UNTIL",
+    "ELSE", "ENDIF", "ENDWHILE", "LOOP", "ENDLOOP", "ENDFOR", "RET", "ENDPROC", "FOR", "IF", "WHILE", "UNTIL", "CASE",
 )  # fmt: skip
 OTHERWISE = {"T": "#", "RP": "PR", "AP": "PA", "CR": "R"}  # other names under which these words are kept
-SPINDLE = re.compile(r"([SM])1")  # address of the master spindle
+SPINDLE = re.compile(r"([SM])(\d+)")  # of a spindle; 1: the master spindle
 Define = Callable[[str, Value, int, str], None]  # sets a variable: name, value, column, its type if it is declared
 
 
@@ -54,6 +55,24 @@ def steering_of(scanner: SiemensScanner, evaluate: Callable[[int], Number]) -> S
     scanner.blanks()
     a_word = name in TABLE or name in REFUSED or name in ADDRESSES or scanner.begins("[", "=")
     return None if a_word else Steering("CALL", name, name, column)
+
+
+def chosen(scanner: SiemensScanner) -> tuple[str, str] | None:
+    """The way and the label that CASE ... OF 1 GOTOF ONE 2 GOTOF TWO DEFAULT GOTOF REST chooses; None: it goes on."""
+    scanner.part(NAME)
+    value, way = scanner.real(), None
+    wrong = scanner.part(NAME) != "OF"
+    while not wrong and not scanner.done:
+        case = scanner.part(DEFAULT) or scanner.real()
+        jump = CASE_JUMP.match(scanner.text, scanner.position)
+        wrong = jump is None
+        if jump is not None:
+            scanner.position = jump.end()
+            if case == value:
+                return jump[1], jump[2]
+            way = (jump[1], jump[2]) if case == "DEFAULT" else way
+    scanner.refuse_if(wrong, "CASE of another form", "CASE R1 OF 1 GOTOF ONE 2 GOTOF TWO DEFAULT GOTOF REST")
+    return way
 
 
 def read_words(scanner: SiemensScanner, define: Define) -> list[Word]:
@@ -90,6 +109,10 @@ def read_words(scanner: SiemensScanner, define: Define) -> list[Word]:
             words += _offset(scanner, index, column)
             continue
         spindle = SPINDLE.fullmatch(name)
+        if spindle and spindle[2] != "1":
+            scanner.result()
+            words.append(Word("SPOS", 0.0, column, scanner.text[begin : scanner.position]))
+            continue
         name = spindle[1] if spindle else name
         if name in REFUSED:
             if scanner.result():  # a zero switches it off
