@@ -6,17 +6,10 @@ import numpy as np
 
 from toolpath_stiff.analysis.statistics import EvaluatedPath
 from toolpath_stiff.arrays import IntArray
+from toolpath_stiff.path.sampling import lines_named
 from toolpath_stiff.units import deg_from_rad, mm_from_m
 
-MOST_NAMED = 5  # lines in a warning
 SHORTEST = 1e-9  # s between samples: less is rounding
-
-
-def lines_named(lines: IntArray) -> str:
-    """Line numbers in words; of many only the first."""
-    each = np.unique(lines)
-    more = f" and {len(each) - MOST_NAMED} more" if len(each) > MOST_NAMED else ""
-    return f"lines {', '.join(map(str, each[:MOST_NAMED]))}{more}"
 
 
 def joint_warnings(path: EvaluatedPath, changes: IntArray | Sequence[int] = ()) -> list[str]:
