@@ -34,10 +34,10 @@ def joint_warnings(path: EvaluatedPath, changes: IntArray | Sequence[int] = ()) 
     if (share > 1.0).any():
         row, joint = np.unravel_index(int(share.argmax()), share.shape)
         unit, shop = ("deg/s", deg_from_rad) if rotary[joint] else ("mm/s", mm_from_m)
-        asked, most = (shop(float(value)) for value in (speed[row, joint], machine.joint_speeds[joint]))
+        needed, allowed = (shop(float(value)) for value in (speed[row, joint], machine.joint_speeds[joint]))
         line = samples.line[counted + 1]
         warnings.append(
             f"{lines_named(line[(share > 1.0).any(axis=1)])} need a joint to exceed its speed, most of all line "
-            f"{line[row]}: {machine.joint_names[joint]} {asked:.3g} {unit} of {most:.3g}; reduce the feed there"
+            f"{line[row]}: {machine.joint_names[joint]} {needed:.3g} {unit} of {allowed:.3g}; reduce the feed there"
         )
     return warnings

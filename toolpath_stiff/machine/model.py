@@ -462,7 +462,7 @@ class Uncertainty:
     correlation
         (p, p).
     errors
-        How far the stiffness may be off at a pose, for bands; None where nobody states it.
+        How far the stiffness may be off at a pose, for bands; None unless stated.
     """
 
     names: tuple[str, ...]
