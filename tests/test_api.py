@@ -302,6 +302,7 @@ def test_shop_units_at_the_door():
         (lambda: tps.map_stiffness("nist", points=1), "points 1"),
         (lambda: tps.map_stiffness("nist", z_mm=(800, 800)), "twice"),
         (lambda: tps.place(tps.Program.from_text(SLOT), "nist", x_mm=(5, -5)), "lower bound first"),
+        (lambda: tps.place(tps.Program.from_text(SLOT), "nist", tilt_a_deg=(0, 400)), "at least -180 and at most 180"),
         (lambda: tps.place(tps.Program.from_text(SLOT), "nist", decimals=3), "without --write"),
         (lambda: tps.place(tps.Program.from_text(SLOT), "nist", objective="best"), "--objective best"),
         (lambda: tps.compare("nist-table1", "nist", noise_percent=80), "--noise 80; expected one or two percentages"),

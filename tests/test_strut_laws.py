@@ -82,8 +82,8 @@ def test_a_table_is_linear_between_its_points_and_goes_on_outside():
     expected = [k[0] - 0.2 * (k[1] - k[0]) / (at[1] - at[0]), k[-1] + 0.2 * (k[-1] - k[-2]) / (at[-1] - at[-2])]
     np.testing.assert_allclose(law.stiffness(np.array([below, above])), expected, rtol=1e-13)
     assert np.isnan(law.stiffness(np.array([np.nan]))).all()
-    assert law.extrapolates(np.array([below, at[0], at[-1], above])).tolist() == [True, False, False, True]
-    assert not CONSTANT_MACHINE.strut_law.extrapolates(np.array([0.1, 2.0, 9.0])).any()
+    assert (law.room(np.array([below, at[0], at[-1], above])) < 0.0).tolist() == [True, False, False, True]
+    assert (CONSTANT_MACHINE.strut_law.room(np.array([0.1, 2.0, 9.0])) > 0.0).all()
 
 
 @pytest.mark.parametrize("machine", [CONSTANT_MACHINE, LINEAR, COLLINEAR, TABLE])

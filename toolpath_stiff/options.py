@@ -30,7 +30,7 @@ class Option:
     unit
         Of a number; of anything else, how it is written.
     above, at_least, below, at_most
-        Bounds of a number.
+        Bounds of a number, or of both ends of LO:HI.
     choices
         The only words that there are.
     read
@@ -65,7 +65,8 @@ class Option:
         """Numbers allowed, in words."""
         bounds = {"more than": self.above, "at least": self.at_least, "less than": self.below, "at most": self.at_most}
         words = [f"{word} {bound:g}" for word, bound in bounds.items() if bound is not None]
-        return f"{' and '.join(words) or 'a finite number'} {self.unit}".strip()
+        allowed = " and ".join(words) or "a finite number"
+        return f"{self.unit}, each {allowed}" if self.read else f"{allowed} {self.unit}".strip()
 
     def holds(self, number: float) -> bool:
         """True for a finite number within the bounds."""
@@ -104,14 +105,21 @@ class Argument:
         """A number converted to the argument's kind; None for other values. Raises `InputError` if not allowed."""
         if self.option.choices and value not in self.option.choices:
             raise self._wrong(value, f"one of {', '.join(self.option.choices)}")
+        if self.option.read is low_high:
+            for end in value if isinstance(value, Sequence) else [value]:
+                self._number(end)
         if self.kind not in (int, float):
             return None
-        number = number_in(value)
-        if not self.option.holds(number):
-            raise self._wrong(value, self.option.expected)
+        number = self._number(value)
         if self.kind is int and number != int(number):
             raise self._wrong(value, "a whole number")
         return int(number) if self.kind is int else number
+
+    def _number(self, value: Any) -> float:
+        number = number_in(value)
+        if not self.option.holds(number):
+            raise self._wrong(value, self.option.expected)
+        return number
 
     def words(self, value: Any) -> list[str]:
         """A value as command-line words: several for an option that may be given several times."""

@@ -460,6 +460,14 @@ def test_a_folder_that_no_system_can_have_is_refused_in_one_line(tmp_path, capsy
     assert not list(tmp_path.iterdir())
 
 
+def test_a_studio_with_a_missing_file_leaves_no_folder_but_keeps_one_that_was_there(tmp_path, capsys):
+    missing = ["studio", str(tmp_path / "missing.csv"), "--no-browser", "--case"]
+    (tmp_path / "kept").mkdir()
+    assert [main([*missing, str(tmp_path / name)]) for name in ("new", "kept")] == [2, 2]
+    assert capsys.readouterr().err.count("cannot read measurements") == 2
+    assert [path.name for path in tmp_path.iterdir()] == ["kept"]
+
+
 def test_what_long_work_is_forked_with_is_there():
     """A module of that list that is gone is passed over in silence, and the first work waits for its libraries."""
     assert all(importlib.util.find_spec(f"toolpath_stiff.{name}") for name in preloading.MODULES)

@@ -222,11 +222,11 @@ def tip_compliances(
     stance = solved(model.machine, *poses)
     stand = reach(model.machine, tip, stance, rotation)
     compliance = np.full((len(tip), 3, 3), np.nan)
-    compliance[stand.reachable] = core.tip_compliance(model, *_some(poses, stand.reachable), force)
+    compliance[stand.reachable] = core.tip_compliance(model, *taken(poses, stand.reachable), force)
     _refuse_no_number(model, tip, stand.reachable & np.isnan(compliance[:, 0, 0]))
     extrapolated = np.zeros(len(tip), dtype=bool)
     if isinstance(model.machine, Hexapod):
-        extrapolated |= model.machine.strut_law.extrapolates(stance.joints).any(axis=1)
+        extrapolated |= (model.machine.strut_law.room(stance.joints) < 0.0).any(axis=1)
     return stance.joints, extrapolated, stand, compliance
 
 
@@ -237,11 +237,12 @@ def compliance_along(
     if not model.load_dependent:
         return np.asarray(np.einsum("ni,nij,nj->n", direction, compliance, direction))
     along, within = np.full(len(direction), np.nan), ~np.isnan(compliance[:, 0, 0])
-    along[within] = core.compliance_along(model, direction[within], *_some(poses, within), force)
+    along[within] = core.compliance_along(model, direction[within], *taken(poses, within), force)
     return along
 
 
-def _some(poses: Poses, rows: BoolArray) -> Poses:
+def taken(poses: Poses, rows: BoolArray) -> Poses:
+    """Some of the poses."""
     tip, rotation, tool = poses
     return tip[rows], None if rotation is None else rotation[rows], tool
 

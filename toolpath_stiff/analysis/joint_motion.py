@@ -6,17 +6,10 @@ import numpy as np
 
 from toolpath_stiff.analysis.statistics import EvaluatedPath
 from toolpath_stiff.arrays import IntArray
+from toolpath_stiff.path.sampling import lines_named
 from toolpath_stiff.units import deg_from_rad, mm_from_m
 
-MOST_NAMED = 5  # lines in a warning
 SHORTEST = 1e-9  # s between samples: less is rounding
-
-
-def lines_named(lines: IntArray) -> str:
-    """Line numbers in words; of many only the first."""
-    each = np.unique(lines)
-    more = f" and {len(each) - MOST_NAMED} more" if len(each) > MOST_NAMED else ""
-    return f"lines {', '.join(map(str, each[:MOST_NAMED]))}{more}"
 
 
 def joint_warnings(path: EvaluatedPath, changes: IntArray | Sequence[int] = ()) -> list[str]:
@@ -41,10 +34,10 @@ def joint_warnings(path: EvaluatedPath, changes: IntArray | Sequence[int] = ()) 
     if (share > 1.0).any():
         row, joint = np.unravel_index(int(share.argmax()), share.shape)
         unit, shop = ("deg/s", deg_from_rad) if rotary[joint] else ("mm/s", mm_from_m)
-        asked, most = (shop(float(value)) for value in (speed[row, joint], machine.joint_speeds[joint]))
+        needed, allowed = (shop(float(value)) for value in (speed[row, joint], machine.joint_speeds[joint]))
         line = samples.line[counted + 1]
         warnings.append(
             f"{lines_named(line[(share > 1.0).any(axis=1)])} need a joint to exceed its speed, most of all line "
-            f"{line[row]}: {machine.joint_names[joint]} {asked:.3g} {unit} of {most:.3g}; reduce the feed there"
+            f"{line[row]}: {machine.joint_names[joint]} {needed:.3g} {unit} of {allowed:.3g}; reduce the feed there"
         )
     return warnings

@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from toolpath_stiff import defaults
-from toolpath_stiff.analysis.evaluation import Poses, compliance_along, joint_columns, tip_compliances
+from toolpath_stiff.analysis.evaluation import Poses, compliance_along, joint_columns, taken, tip_compliances
 from toolpath_stiff.analysis.loads import principal_directions
 from toolpath_stiff.arrays import AnyArray, BoolArray, FloatArray
 from toolpath_stiff.column_files import csv_rows
@@ -181,8 +181,7 @@ def _by_axes(model: StiffnessModel, compliance: FloatArray, poses: Poses, force:
     """(n, 3, 3) m/N, each column with the load along that axis; `compliance` as from `tip_compliances`."""
     by_axes, within = compliance.copy(), ~np.isnan(compliance[:, 0, 0])
     if model.load_dependent and within.any():
-        tip, rotation, tool = poses
-        some = (tip[within], None if rotation is None else rotation[within], tool)
+        some = taken(poses, within)
         for axis, load in enumerate(force * np.eye(3)):
             tensor = core.tip_compliance(model, *some, load=np.broadcast_to(load, some[0].shape))
             by_axes[within, :, axis] = tensor[:, :, axis]

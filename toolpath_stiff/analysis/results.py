@@ -13,7 +13,7 @@ from toolpath_stiff import defaults
 from toolpath_stiff.analysis.assumptions import assumptions_of, pose_words, words_turn_the_platform
 from toolpath_stiff.analysis.cut_figures import cut_columns, cut_document, lines_beyond
 from toolpath_stiff.analysis.evaluation import Progress, evaluate
-from toolpath_stiff.analysis.joint_motion import joint_warnings, lines_named
+from toolpath_stiff.analysis.joint_motion import joint_warnings
 from toolpath_stiff.analysis.loads import Load, parse_load
 from toolpath_stiff.analysis.statistics import (
     FIGURES,
@@ -33,7 +33,7 @@ from toolpath_stiff.files import Content
 from toolpath_stiff.machine.model import Hexapod, MachineTool
 from toolpath_stiff.nc.moves import RAPID, Moves, ReadProgram
 from toolpath_stiff.path.placing import place
-from toolpath_stiff.path.sampling import sample_moves
+from toolpath_stiff.path.sampling import lines_named, sample_moves
 from toolpath_stiff.poses import Pose, pose_in_mm
 from toolpath_stiff.results import DataFrame, Figure, FolderResult, frame_of
 from toolpath_stiff.stiffness.model import (

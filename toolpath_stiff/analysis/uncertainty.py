@@ -39,7 +39,7 @@ class ParameterBand:
     factors
         (n, r) N/m by which the stiffness changes with each of r independent errors; nan out of reach.
     form
-        (n,) N/m, standard deviation of what the model lacks; 0 where nobody states it.
+        (n,) N/m, standard deviation of what the model lacks; 0 unless stated.
     few
         (n,) few readings near there.
     place, direction

@@ -8,7 +8,7 @@ import numpy as np
 
 from toolpath_stiff.api.machines import Machine
 from toolpath_stiff.api.measurements import Data
-from toolpath_stiff.api.questions import Noise, Question
+from toolpath_stiff.api.question import Noise, Question
 from toolpath_stiff.documents import Document
 from toolpath_stiff.inference.candidates import Candidate, Component
 from toolpath_stiff.inference.element_predictor import predictor_of

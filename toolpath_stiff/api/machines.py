@@ -150,8 +150,8 @@ class Machine(Result):
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickling for another process: effects of one's own travel as files, as their classes cannot."""
         files = tuple(str(Path(file).absolute()) for file in self.effect_files)
-        told = (self.asked, files, self.setup, self.temperature_C, self.allow_unchecked_effects)
-        return _machine_again, (self.stated, self.model.conditions, self.model.unchecked, told)
+        given = (self.asked, files, self.setup, self.temperature_C, self.allow_unchecked_effects)
+        return _machine_again, (self.stated, self.model.conditions, self.model.unchecked, given)
 
     @staticmethod
     def names() -> list[str]:
@@ -204,7 +204,7 @@ class Machine(Result):
     def running(self, program: Program | None = None, beside: Sequence[Machine] = ()) -> StiffnessModel:
         """The model under its conditions: those given to `load`, else a program's controller file's, else its own.
 
-        `beside` are machines that the same is said of. Raises `InputError` for a set-up that none of them knows.
+        `beside`: further machines under the same conditions. Raises `InputError` for a set-up that none of them knows.
 
         Examples
         --------
@@ -385,10 +385,10 @@ class Machine(Result):
 
 
 def _machine_again(
-    stated: MachineTool, conditions: Conditions, unchecked: tuple[str, ...], told: tuple[Any, ...]
+    stated: MachineTool, conditions: Conditions, unchecked: tuple[str, ...], given: tuple[Any, ...]
 ) -> Machine:
     """A machine rebuilt in another process."""
-    return Machine(replace(build_model(stated, told[1], conditions=conditions), unchecked=unchecked), *told)
+    return Machine(replace(build_model(stated, given[1], conditions=conditions), unchecked=unchecked), *given)
 
 
 def _checked_model(machine: str, files: tuple[str, ...], allow_unchecked_effects: bool) -> StiffnessModel:

@@ -34,7 +34,6 @@ from toolpath_stiff.results import Progress, counter
 from toolpath_stiff.rewriting.program import RewrittenProgram, rewrite_program
 from toolpath_stiff.units import m_from_mm, mm_from_m, n_per_mm_from_n_per_m, rad_from_deg
 
-FARTHEST_TURN_DEG = 720.0
 MOST_FRONT_POINTS = 1000
 ERROR = "error"  # the objective that requires a cut
 Range = tuple[float, float] | float
@@ -50,9 +49,9 @@ def place(
     z_mm: Annotated[Range | None, Option("--z", "LO:HI", read=low_high)] = None,
     z_values_mm: Annotated[Sequence[float], Option("--z-values", "Z,Z,...", read=numbers, instead_of="z_mm")] = (),
     base_mm: Annotated[Sequence[float], Option("--base", "X,Y,Z", read=numbers)] = (0.0, 0.0, 0.0),
-    rotate_deg: Annotated[Range, Option("--rotate", "LO:HI", read=low_high)] = (0.0, 360.0),
-    tilt_a_deg: Annotated[Range, Option("--tilt-a", "LO:HI", read=low_high)] = 0.0,
-    tilt_b_deg: Annotated[Range, Option("--tilt-b", "LO:HI", read=low_high)] = 0.0,
+    rotate_deg: Annotated[Range, Option("--rotate", "LO:HI", at_least=-720, at_most=720, read=low_high)] = (0.0, 360.0),
+    tilt_a_deg: Annotated[Range, Option("--tilt-a", "LO:HI", at_least=-180, at_most=180, read=low_high)] = 0.0,
+    tilt_b_deg: Annotated[Range, Option("--tilt-b", "LO:HI", at_least=-180, at_most=180, read=low_high)] = 0.0,
     turn: inputs.Turn = FIXED,
     keep_out: Annotated[
         Iterable[KeepOut], Option("--keep-out", "NAME:X0,Y0,Z0,X1,Y1,Z1", read=_keep_out, count="append")
@@ -202,8 +201,8 @@ def _bounds(
             raise InputError(f"the machine file has no workspace limits in {axis}", hint=f"give --{axis} LO:HI")
     lengths = np.array([_pair(reach if side is None else side) for side, reach in zip(sides, workspace, strict=True)])
     angles = np.array([_pair(turn) for turn in (*turns, *_turn_of_tool(machine, tool))])
-    if not np.abs(lengths).max() <= inputs.FARTHEST_MM or not np.abs(angles).max() <= FARTHEST_TURN_DEG:
-        raise InputError("bounds beyond reason", expected=f"within 100 m and {FARTHEST_TURN_DEG:g} degrees")
+    if not np.abs(lengths).max() <= inputs.FARTHEST_MM:
+        raise InputError("bounds beyond reason", expected="within 100 m")
     low, high = np.concatenate([m_from_mm(lengths), rad_from_deg(angles)]).T
     return Bounds(low, high, tuple(m_from_mm(z) for z in heights))
 
@@ -215,7 +214,7 @@ def _turn_of_tool(machine: MachineTool, turn: str | float) -> list[Range]:
     check_free_turn(machine, turn)
     if turn == FEED:
         raise InputError(f"--turn {turn}", expected=f"{FIXED}, {BEST}, or degrees: one turn for the whole path")
-    return [(0.0, 360.0) if turn == BEST else float(turn)]
+    return [(0.0, 360.0) if turn == BEST else inputs.finite("--turn", float(turn))]
 
 
 def _from_base(

@@ -11,38 +11,35 @@
 No file is written twice: a change is a new file and a step that names it, so to undo is to forget the last steps.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Self, Unpack, cast
+from typing import Any, Self, Unpack
 
 import toolpath_stiff as tps
-from toolpath_stiff.api.by_hand import Preview, preview, with_effects
 from toolpath_stiff.api.inputs import pose_si
-from toolpath_stiff.api.trust import agree, is_agreed
+from toolpath_stiff.api.trust import agree
+from toolpath_stiff.case.contents import Contents
 from toolpath_stiff.case.files import copied, free_name, kept_if_read, measurements_csv, without_lines
-from toolpath_stiff.case.state import CASE_FILE, READING, TABLES, CaseState, Step, call, case_text, read_steps
+from toolpath_stiff.case.results import find
+from toolpath_stiff.case.state import CASE_FILE, READING, TABLES, Step, call, case_text, read_steps
 from toolpath_stiff.cutting.setup import read_setup
 from toolpath_stiff.defaults import MACHINE
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import InputError
-from toolpath_stiff.files import is_file, read_bytes, write_atomically, writing_errors
+from toolpath_stiff.files import read_bytes, write_atomically, writing_errors
 from toolpath_stiff.hints import command_line, options
 from toolpath_stiff.machine.file import packaged_machines
 from toolpath_stiff.nc.program import Reading
-from toolpath_stiff.options import arguments_of, words_of
+from toolpath_stiff.options import arguments_of
 from toolpath_stiff.report.words import counted
 from toolpath_stiff.results import Progress, json_text
 from toolpath_stiff.rig import exercise as rig
 from toolpath_stiff.rig.case import draw_case
 from toolpath_stiff.stiffness.catalogue import find_effect, known_effects
 
-Found = tuple[Any, str]  # a result, and the command line that gives it
-PLACE = ("x_mm", "y_mm", "z_mm", "tilt_a_deg", "tilt_b_deg", "rotate_deg")  # as of an origin
-DRAFT = "missing"
 
-
-class Case:
+class Case(Contents):
     r"""A folder that holds a machine, measurements, a program, and every step done with them.
 
     Attributes
@@ -70,12 +67,6 @@ class Case:
     ['machine', 'exercise']
     (('exercise/measurements.csv', 'data/measured.csv'), 'right')
     """
-
-    plots = False
-    _preview: tuple[object, Preview] | None = None
-
-    def __init__(self, folder: Path, history: Sequence[Step] = ()) -> None:
-        self.folder, self.history = folder, list(history)
 
     @classmethod
     def open(cls, folder: str | Path, machine: str | Path = MACHINE, trust: Iterable[str] = ()) -> Self:
@@ -124,95 +115,6 @@ class Case:
     def __repr__(self) -> str:
         return f"<Case {self.folder.name}: {len(self.history)} steps>"
 
-    @property
-    def state(self) -> CaseState:
-        """State after the last step."""
-        return self.history[-1].state if self.history else CaseState()
-
-    def path(self, name: str) -> str:
-        """Path of a file of the case, as functions and commands take it."""
-        return str(self.folder / name)
-
-    @property
-    def effect_files(self) -> tuple[str, ...]:
-        """Files of the user's own effects; raises `InputError` for one whose code this user has not agreed to run."""
-        for name in self.state.effects:
-            file = self.folder / name
-            if not is_file(file) or not is_agreed(file.read_bytes()):
-                hint = f"read it, then `{command_line('studio', *options(case=self.folder, trust=name))}`"
-                raise InputError(f"{file} is code that came with the case; you have not agreed to run it", hint=hint)
-        return tuple(map(self.path, self.state.effects))
-
-    @property
-    def machine(self) -> tps.Machine:
-        """The machine, with the user's own effects."""
-        return self.machine_of(self.state.machine)
-
-    def machine_of(self, file: str) -> tps.Machine:
-        """A machine file of the case, with the user's own effects.
-
-        Examples
-        --------
-        >>> import tempfile
-        >>> import toolpath_stiff as tps
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     case = tps.Case.open(folder)
-        ...     case.machine_of(case.state.machine)
-        <Machine nist: 6 struts, no effects>
-        """
-        return tps.Machine.load(self.path(file), effects=self.effect_files)
-
-    def machine_with(self, on: Mapping[str, Document]) -> tps.Machine:
-        """The machine with effects of given sizes; if there are readings, the strut law is refitted with them.
-
-        Examples
-        --------
-        >>> import tempfile
-        >>> import toolpath_stiff as tps
-        >>> with tempfile.TemporaryDirectory() as folder:
-        ...     tps.Case.open(folder).machine_with({"weak_strut": {"strut": 4, "factor": 0.8}})
-        <Machine nist: 6 struts, weak_strut>
-        """
-        if not on:
-            return self.machine
-        return self.preview.machine(on) if self.state.data else with_effects(self.machine, on)
-
-    @property
-    def cut(self) -> str | None:
-        """Setup file of the cut; None if there is none."""
-        return self.path(self.state.cut) if self.state.cut else None
-
-    @property
-    def data(self) -> tps.Measurements:
-        """Readings in use. Raises `InputError` if there are none."""
-        if not self.state.data:
-            raise InputError("this case has no measurements", hint="add a file with add_data, or start an exercise")
-        return tps.Measurements(list(map(self.path, self.state.data_files)))
-
-    @property
-    def preview(self) -> Preview:
-        """Errors of the readings in use for effects of any size, as `tps.preview`; made once for a set of readings."""
-        if self._preview is None or self._preview[0] != self.state.judged:
-            self._preview = (self.state.judged, preview(self.data, self.machine))
-        return self._preview[1]
-
-    @property
-    def program(self) -> tps.Program:
-        """The program. Raises `InputError` if there is none."""
-        if not self.state.program:
-            raise InputError("this case has no program", hint="add one with add_program")
-        return self._program(self.state)
-
-    def _program(self, state: CaseState) -> tps.Program:
-        reading = {key: self.path(value) if key in TABLES else value for key, value in state.reading.items()}
-        if not state.program:  # without a program the tables are still read, so that errors show
-            return tps.Program.from_text("M2", **cast("Reading", reading))
-        return tps.Program.read(self.path(state.program), **cast("Reading", reading))
-
-    def latest(self, kind: str) -> str:
-        """Folder of the latest result of a kind; "" if there is none."""
-        return next((step.result for step in reversed(self.history) if step.kind == kind and step.result), "")
-
     def record(self, kind: str, text: str, python: str, command: str = "", result: str = "", **change: Any) -> None:
         """Add a step that changes these attributes of the state, and save the case.
 
@@ -236,10 +138,6 @@ class Case:
             raise InputError(f"{CASE_FILE} was changed by another program since then", hint="open the case again")
         write_atomically(file, case_text(history))
         self.history = history
-
-    def next_result(self, kind: str) -> str:
-        """A free folder for a result."""
-        return free_name(self.folder, f"results/{len(self.history) + 1:03d}-{kind}")
 
     def set_machine(self, machine: str | Path) -> None:
         """Use another machine, by name or file; the case keeps a copy.
@@ -506,83 +404,3 @@ class Case:
         line = command_line("rig", "reveal", self.state.exercise, *options(claim=effects))
         self.record("reveal", f"claimed {effects}: {score['verdict']}", call("claim", effects), line, result)
         return score
-
-
-def find(case: Case, kind: str, result: str, progress: Progress | None = None, **given: Any) -> Found:
-    """A result of a kind, kept in a folder of the case without a step, and the command that gives it."""
-    if kind in FINDERS:
-        return FINDERS[kind](case, result, progress, **given)
-    watched: Document = {} if kind == "plan" else {"progress": progress}
-    named: Document = {"machine_file": case.path(f"{result}/machine.toml")} if kind == "update" else {}
-    data = case.data if case.state.data or kind != "plan" else None
-    kept = getattr(tps, kind)(data, case.machine, **watched, **named, **given)
-    kept.save(case.folder / result, plots=case.plots)
-    return kept, case.state.question(kind, "", *words_of(getattr(tps, kind), given))
-
-
-def _analyze(case: Case, result: str, progress: Progress | None, machine: str = "") -> Found:
-    state = case.state
-    on, machine = (case.machine_of(machine), machine) if machine else _switched(case, result)
-    stated: Document = {"origin_mm_deg": state.origin or None, "require_N_per_mm": state.require or None}
-    analysis = tps.analyze(case.program, on, cut=case.cut, partial=True, progress=progress, **stated)
-    analysis.save(case.folder / result, plots=case.plots)
-    return analysis, state.program_line(machine=machine)
-
-
-def _switched(case: Case, result: str) -> tuple[tps.Machine, str]:
-    """The machine with the effects that are switched on, and its file among the results; "" if none is on."""
-    on, name = case.machine_with(case.state.on), f"{result}/machine.toml"
-    if not case.state.on:
-        return on, ""
-    on.save(case.folder / name)
-    return on, name
-
-
-def _compensate(case: Case, result: str, progress: Progress | None) -> Found:
-    state, origin, (on, machine) = case.state, case.state.origin or None, _switched(case, result)
-    kept = tps.compensate(case.program, on, cut=case.cut, origin_mm_deg=origin, progress=progress)
-    file = Path(state.program)
-    kept.save(case.folder / result / f"{file.stem}_comp{file.suffix}")
-    return kept, state.program_line("compensate", machine)
-
-
-def _place(case: Case, result: str, progress: Progress | None, **bounds: Any) -> Found:
-    on, machine = _switched(case, result)
-    kept = tps.place(case.program, on, origin_mm_deg=case.state.origin or None, progress=progress, **bounds)
-    kept.save(case.folder / result, plots=case.plots)
-    return kept, case.state.program_line("place", machine, **bounds)
-
-
-def _set_up(case: Case, result: str, progress: Progress | None) -> Found:
-    state = case.state
-    if len(state.origin) < 3:
-        raise InputError("the program is still at its initial placement", hint="put it somewhere with place_at first")
-    place: Document = dict(zip(PLACE, (*state.origin, 0.0, 0.0, 0.0), strict=False))
-    (on, machine), name, written = _switched(case, result), Path(state.program).name, {}
-    try:
-        placement = tps.place(case.program, on, write=name, progress=progress, **place)
-        content, written = placement.program_bytes, {"write": f"{result}/{name}"}
-    except InputError as error:
-        placement = tps.place(case.program, on, progress=progress, **place)
-        name, content = "not_written.txt", f"{error}\n".encode()
-    placement.save(case.folder / result)
-    write_atomically(case.folder / result / name, content)
-    return placement, f"{state.program_line('place', machine, origin_mm_deg=None, **place, **written)} --out {result}"
-
-
-def _draft(case: Case, result: str, progress: Progress | None) -> Found:
-    number = 1 + sum(Path(file).stem.startswith(DRAFT) for file in case.state.effects)
-    file = f"{result}/{DRAFT}{f'_{number}' if number > 1 else ''}.toml"
-    draft = tps.draft_effect(case.data, case.machine, file, progress=progress)
-    if draft.text:
-        write_atomically(case.folder / file, draft.text)
-    return draft, case.state.question("effects draft", "", *options(output=file))
-
-
-FINDERS: dict[str, Callable[..., Found]] = {
-    "analyze": _analyze,
-    "compensate": _compensate,
-    "place": _place,
-    "set_up": _set_up,
-    "draft": _draft,
-}

@@ -48,7 +48,7 @@ def copied(folder: Path, file: str | Path, room: str, content: bytes | None = No
 
 
 def measurements_csv(file: str | Path, machine: Machine) -> bytes:
-    """A measurement file as CSV: a CSV file as it stands, a workbook or packaged data as a table."""
+    """A measurement file as CSV: a CSV file unchanged, a workbook or packaged data as a table."""
     name = str(file)
     if name != NIST_TABLE_1 and ".xlsx" not in name.lower():
         return read_bytes(name, "measurements")

@@ -128,7 +128,7 @@ def write_single(
 ) -> list[Path]:
     """Write files; an existing file with other content is kept, or refused with `fresh`.
 
-    Raises `InputError` where one is an input.
+    Raises `InputError` for a file that is an input.
     """
     for file, content in contents.items():
         if fresh and file.exists() and not args.replace:

@@ -9,7 +9,7 @@ from toolpath_stiff.cli import run
 from toolpath_stiff.cli.parser import FILES, command
 from toolpath_stiff.nc.program import Program, Reading
 from toolpath_stiff.options import Option, arguments_of
-from toolpath_stiff.studio.run import opened_case, serve
+from toolpath_stiff.studio.run import opened_case, removed_if_refused, serve
 
 # A case uses its own program reader: no other interpreter, no files from elsewhere.
 NOT_IN_A_CASE = ("interpreter", "rs274", "subprograms", "unconfined")
@@ -55,11 +55,12 @@ def studio(
         Print the address, open nothing.
     """
     reading = {name: value for name, value in run.given(args, Program.read).items() if value not in (None, False)}
-    opened = opened_case(case, trust, machine, exercise)
-    for file in args.effects:
-        opened.add_effects(file)
-    if data:
-        opened.add_data(*data)
-    if program or reading:
-        opened.add_program(program or None, **cast("Reading", reading))
+    with removed_if_refused(case):
+        opened = opened_case(case, trust, machine, exercise)
+        for file in args.effects:
+            opened.add_effects(file)
+        if data:
+            opened.add_data(*data)
+        if program or reading:
+            opened.add_program(program or None, **cast("Reading", reading))
     return serve(opened, port, browser=not no_browser)

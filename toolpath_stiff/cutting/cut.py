@@ -24,7 +24,7 @@ from toolpath_stiff.cutting.workpiece import Workpiece, stages_of
 from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.courses import move_lengths
 from toolpath_stiff.nc.moves import Moves, ReadProgram
-from toolpath_stiff.path.sampling import Samples, sample_moves
+from toolpath_stiff.path.sampling import Samples, lines_named, sample_moves
 from toolpath_stiff.poses import Pose
 from toolpath_stiff.results import Progress
 from toolpath_stiff.rotations import along_tool_axis
@@ -33,7 +33,6 @@ from toolpath_stiff.units import per_min_from_rad_per_s
 
 BLOCK = 16_384  # stations at a time
 KEPT = np.float32  # precision of results
-MOST_NAMED = 5  # lines in a warning
 THIN = 0.1  # of the width of cut: a larger error changes the engagement
 OTHER = 0.1  # of a wall's error: if the pass itself makes less, most comes from an earlier pass
 ROUNDED = 1e-12  # of a cosine
@@ -120,11 +119,7 @@ class Cut:
 
     def lines_warning(self, rows: BoolArray, words: str) -> list[str]:
         """A sentence that names the lines of the chosen samples (n,) and the problem; [] without samples."""
-        lines = np.unique(self.samples.line[rows]).tolist()
-        if not lines:
-            return []
-        more = f" and {len(lines) - MOST_NAMED} more" if len(lines) > MOST_NAMED else ""
-        return [f"lines {', '.join(map(str, lines[:MOST_NAMED]))}{more}: {words}"]
+        return [f"{lines_named(self.samples.line[rows])}: {words}"] if rows.any() else []
 
 
 def evaluate_cut(

@@ -19,7 +19,7 @@ UNITS = {"metric": 1.0, "imperial": MM_PER_INCH}
 def machine_from_fcm(text: str, order: Sequence[str], file: str) -> tuple[str, list[str]]:
     """A machine file and notes, from the text of a FreeCAD machine; `order`: axes from the base, if it states none.
 
-    Raises `InputError` for what is no machine, an order that nobody says, and mirrored axes.
+    Raises `InputError` for what is no machine, a missing order of axes, and mirrored axes.
     """
 
     def fault(mistake: str, expected: str = "", hint: str = "") -> InputError:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from toolpath_stiff import defaults
-from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
+from toolpath_stiff.arrays import FloatArray, IntArray
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import EffectError, InputError
 from toolpath_stiff.machine.elements import Element, Stance
@@ -152,10 +152,6 @@ class StrutLaw:
         slack = 5e-7
         low, high = sorted((self.length_1, self.length_2))
         return np.asarray(np.minimum(shortest - (low - slack), (high + slack) - longest))
-
-    def extrapolates(self, length: FloatArray) -> BoolArray:
-        """True where a length lies outside the range of the law."""
-        return np.asarray(self.room(length) < 0.0)
 
 
 def _piecewise(position: FloatArray, knots: FloatArray, values: FloatArray) -> FloatArray:
@@ -466,7 +462,7 @@ class Uncertainty:
     correlation
         (p, p).
     errors
-        How far the stiffness may be off at a pose, for bands; None where nobody states it.
+        How far the stiffness may be off at a pose, for bands; None unless stated.
     """
 
     names: tuple[str, ...]

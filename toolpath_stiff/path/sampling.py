@@ -25,6 +25,7 @@ BLOCK = 65_536  # samples at a time: the work arrays stay in the processor's cac
 BORDER = np.cos(defaults.PLUNGE_ANGLE) - 1e-12  # of the cosine; beyond it a sample is a cut whatever rounding does
 HALVINGS = 50  # to the last digit of a share of a move
 ROUNDED = 1e-9  # rad, or of a cosine
+MOST_NAMED = 5  # lines in a warning
 MOST_SAMPLES = 20_000_000  # 144 bytes each, 3 GB; beyond that the step is a mistake
 
 
@@ -354,3 +355,10 @@ def move_figures(moves: Moves, rapid_feed: float = defaults.RAPID_FEED) -> dict[
         "lengths_mm": {**lengths, "total": sum(lengths.values())},
         "times_s": {**times, "total": sum(times.values())},
     }
+
+
+def lines_named(lines: IntArray) -> str:
+    """Line numbers in words; of many only the first."""
+    each = np.unique(lines)
+    more = f" and {len(each) - MOST_NAMED} more" if len(each) > MOST_NAMED else ""
+    return f"lines {', '.join(map(str, each[:MOST_NAMED]))}{more}"

@@ -219,7 +219,7 @@ class _Pull:
         record = {name: "" if cell.strip().lower() in NOT_READ else cell for name, cell in record.items()}
 
         def mm(names: Sequence[str]) -> tuple[float, ...]:
-            return tuple(m_from_mm(number(record, name)) if record.get(name) else 0.0 for name in names)
+            return tuple(m_from_mm(optional_number(record, name, 0.0)) for name in names)
 
         values = [np.nan] * (1 + max(i for i, _ in joints.values()))
         for name, (i, linear) in joints.items():
@@ -230,7 +230,7 @@ class _Pull:
             expected = f"{', '.join(POSITION)}; or {', '.join(joints)}"
             raise MeasurementError("neither a pose nor all joints", expected=expected)
         blank = 0.0 if any(record.get(name) for name in ANGLES) else np.nan
-        angles = tuple(rad_from_deg(number(record, name)) if record.get(name) else blank for name in ANGLES)
+        angles = tuple(rad_from_deg(optional_number(record, name, blank)) for name in ANGLES)
         tension, vector = optional_number(record, TENSION), any(record.get(name) for name in FORCE)
         components = np.array([_component(record, name) if vector else np.nan for name in FORCE])
         along = direction_of(record) if record.get("force_N") and not vector and np.isnan(tension) else None
@@ -278,7 +278,7 @@ def _component(record: Mapping[str, str], name: str) -> float:
 
 def _turn(record: Mapping[str, str], names: Sequence[str]) -> FloatArray:
     """(3, 3) axes in which components are given, as columns in base axes."""
-    angles = [rad_from_deg(number(record, name)) if record.get(name) else 0.0 for name in names]
+    angles = [rad_from_deg(optional_number(record, name, 0.0)) for name in names]
     return np.asarray(rotation_matrices(np.array(angles)))
 
 

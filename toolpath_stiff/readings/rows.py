@@ -293,9 +293,9 @@ def number(record: Mapping[str, str], name: str, bounds: tuple[float, float] | N
     return value
 
 
-def optional_number(record: Mapping[str, str], name: str) -> float:
-    """A number, or nan if the column is absent or the cell empty."""
-    return number(record, name) if record.get(name) else math.nan
+def optional_number(record: Mapping[str, str], name: str, blank: float = math.nan) -> float:
+    """A number; `blank` if the column is absent or the cell empty."""
+    return number(record, name) if record.get(name) else blank
 
 
 def duplicates(rows: list[Row]) -> list[InputError]:

@@ -1,6 +1,6 @@
 """Figures of an analysis in words and tables, the same on the terminal, in pictures and on pages."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from toolpath_stiff.analysis.results import Analysis, compare_summaries
 from toolpath_stiff.analysis.statistics import FIGURES, PLUNGES_ONLY
@@ -167,21 +167,25 @@ def and_more(entries: Sequence[object], most: int, things: str) -> list[str]:
 
 def required(analysis: Analysis) -> tuple[str, ShownTable]:
     """Sentence on whether every cut has the required stiffness, and the lines that have not, weakest first."""
-    entry, source = analysis.to_dict()["required"], analysis.program.source
-    level, below = number(entry["required_N_per_mm"]), entry["below"]
-    if not below:
+    entry = analysis.to_dict()["required"]
+    level, lowest = number(entry["required_N_per_mm"]), {row["line"]: row["min_N_per_mm"] for row in entry["below"]}
+    if not lowest:
         return f"Every cutting move has the required {level} N/mm.", ShownTable((), ())
-    more = f", the {MOST_ROWS} weakest of them here" if len(below) > MOST_ROWS else ""
+    below = {line: "no stiffness" if value is None else number(value) for line, value in lowest.items()}
+    return lines_listed(analysis, below, f"below the required {level} N/mm", ">lowest N/mm", "weakest")
+
+
+def lines_listed(
+    analysis: Analysis, figures: Mapping[int, str], fault: str, title: str, which: str = "worst"
+) -> tuple[str, ShownTable]:
+    """Sentence on the lines with a fault, and a table of the first of them with their figures."""
+    source = analysis.program.source
+    more = f", the {MOST_ROWS} {which} of them here" if len(figures) > MOST_ROWS else ""
     rows = [
-        (
-            f"line {row['line']}",
-            "no stiffness" if row["min_N_per_mm"] is None else number(row["min_N_per_mm"]),
-            markup("<code>{}</code>", source[row["line"] - 1].strip() if source else ""),
-        )
-        for row in below[:MOST_ROWS]
+        (f"line {line}", figure, markup("<code>{}</code>", source[line - 1].strip() if source else ""))
+        for line, figure in [*figures.items()][:MOST_ROWS]
     ]
-    sentence = f"{counted(len(below), 'line')} below the required {level} N/mm{more}:"
-    return sentence, ShownTable(("", ">lowest N/mm", "program"), rows)
+    return f"{counted(len(figures), 'line')} {fault}{more}:", ShownTable(("", title, "program"), rows)
 
 
 def comparison(summary: Document, other: Document) -> ShownTable:

@@ -7,11 +7,10 @@ import numpy as np
 from toolpath_stiff.analysis.results import Analysis
 from toolpath_stiff.arrays import IntArray
 from toolpath_stiff.documents import Document, number
+from toolpath_stiff.report.analysis_tables import MOST_ROWS, lines_listed
 from toolpath_stiff.report.pages import Part, markup
 from toolpath_stiff.report.tables import LABEL, ShownTable
-from toolpath_stiff.report.words import counted, labelled
-
-MOST_ROWS = 200
+from toolpath_stiff.report.words import labelled
 
 
 def text(analysis: Analysis) -> list[str]:
@@ -72,20 +71,11 @@ def places(entries: Sequence[Document], rows: Sequence[int] = ()) -> ShownTable:
 
 def tolerance(analysis: Analysis) -> tuple[str, ShownTable]:
     """Sentence on whether every surface is within tolerance, and the lines that leave it, worst first."""
-    entry, source = analysis.to_dict()["cut"]["tolerance"], analysis.program.source
-    beyond, level = entry["beyond"], f"{entry['tolerance_um']:g} um"
+    entry = analysis.to_dict()["cut"]["tolerance"]
+    level, beyond = f"{entry['tolerance_um']:g} um", {row["line"]: f"{row['worst_um']:+.1f}" for row in entry["beyond"]}
     if not beyond:
         return f"Every surface that is finished is within {level}.", ShownTable((), ())
-    more = f", the {MOST_ROWS} worst of them here" if len(beyond) > MOST_ROWS else ""
-    rows = [
-        (
-            f"line {row['line']}",
-            f"{row['worst_um']:+.1f}",
-            markup("<code>{}</code>", source[row["line"] - 1].strip() if source else ""),
-        )
-        for row in beyond[:MOST_ROWS]
-    ]
-    return f"{counted(len(beyond), 'line')} beyond {level}{more}:", ShownTable(("", ">worst um", "program"), rows)
+    return lines_listed(analysis, beyond, f"beyond {level}", ">worst um")
 
 
 PART = (

@@ -11,22 +11,23 @@ REMARK = (
     "Displacement between the indicator's two points per load at the tip; of a strut alone, per force in it. By loop "
     "in the mean, counted in the direction in which the struts of the machine file would move it."
 )
+TITLES = ("loop", ">readings", ">read, nm/N", ">modelled, nm/N", ">off, nm/N", ">standard deviations")
 
 
 def loops_section(loops: Sequence[LoopMean]) -> Section:
     """Section of a page, loop by loop."""
-    by_loop = ShownTable.of(
-        loops,
-        {
-            "loop": lambda mean: mean.loop,
-            ">readings": lambda mean: mean.readings,
-            ">read, nm/N": lambda mean: f"{mean.read_nm_per_N:.2f}",
-            ">modelled, nm/N": lambda mean: f"{mean.model_nm_per_N:.2f}",
-            ">off, nm/N": lambda mean: f"{mean.off_nm_per_N:+.2f} +- {mean.sd_nm_per_N:.2f}",
-            ">standard deviations": lambda mean: f"{mean.standard_deviations:+.1f}",
-        },
-    )
-    return "Indicators beside the tip", by_loop, REMARK if loops else ""
+    rows = [
+        (
+            mean.loop,
+            mean.readings,
+            f"{mean.read_nm_per_N:.2f}",
+            f"{mean.model_nm_per_N:.2f}",
+            f"{mean.off_nm_per_N:+.2f} +- {mean.sd_nm_per_N:.2f}",
+            f"{mean.standard_deviations:+.1f}",
+        )
+        for mean in loops
+    ]
+    return "Indicators beside the tip", ShownTable(TITLES, rows), REMARK if loops else ""
 
 
 def loops_text(loops: Sequence[LoopMean]) -> list[str]:

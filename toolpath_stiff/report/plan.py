@@ -24,8 +24,4 @@ def text(plan: Plan) -> str:
     return "\n".join([*lines, "", *promise, *(f"note: {note}" for note in plan.choice.notes)])
 
 
-def _rows(plan: Plan) -> str:
-    return plan_csv(plan.rows)
-
-
-DATA = {"plan.csv": _rows, "plan.json": Plan.to_json}
+DATA = {"plan.csv": lambda plan: plan_csv(plan.rows), "plan.json": Plan.to_json}

@@ -1,8 +1,8 @@
 """A table in one form: lines on a terminal, or part of a page."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Self, TypeVar
+from typing import Self
 
 from markupsafe import Markup
 
@@ -10,7 +10,6 @@ from toolpath_stiff.report.words import WIDTH, plain, shortened
 
 LABEL = 14  # columns of the left-hand words
 LEAST_NAME = 24  # columns for the first column, however wide the others are
-Item = TypeVar("Item")
 
 
 @dataclass(frozen=True)
@@ -30,13 +29,6 @@ class ShownTable:
     head: Sequence[str]
     rows: Sequence[Sequence[object]]
     kinds: Sequence[str] = ()
-
-    @classmethod
-    def of(
-        cls, items: Iterable[Item], columns: Mapping[str, Callable[[Item], object]], kinds: Sequence[str] = ()
-    ) -> Self:
-        """Table with a row for each item; `columns`: title -> function of the item for the cell."""
-        return cls([*columns], [[show(item) for show in columns.values()] for item in items], kinds)
 
     @property
     def titles(self) -> list[str]:

@@ -4,7 +4,7 @@ Words are chosen so that `out`, at the original origin, arrives where the placem
 executes the very text that is written, roundings never add up, not even in G91, and work offsets, G92, G52, G10 and
 tool lengths need no rewriting: whatever they make of the numbers, `out` does the same. Every written block is checked.
 
-Edits replace, add and take out words of one line; everything else of it stays as it stands.
+Edits replace, add and take out words of one line; everything else of it stays unchanged.
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ class Nominal:
     Attributes
     ----------
     text
-        The machine file as it stands.
+        The machine file as given.
     frame_joints, platform_joints
         (6, 3) m; base frame, and platform frame with the reference tool's tip as the origin.
     tool_length

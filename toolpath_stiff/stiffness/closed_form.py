@@ -73,12 +73,6 @@ def _split(machine: Hexapod) -> tuple[list[int], float]:
     return [*best, *(i for i in range(6) if i not in best)], arm
 
 
-def well_conditioned(kernel: ClosedForm, first: FloatArray, second: FloatArray) -> BoolArray:
-    """True where neither of the elimination's two determinants is small."""
-    small = SMALL_DETERMINANT
-    return np.asarray((np.abs(first) > small) & (np.abs(second) > small * kernel.arm**3))
-
-
 def compliance_along_columns(
     kernel: ClosedForm,
     position: FloatArray,
@@ -151,7 +145,8 @@ def _balanced(
     taken = dot(of_a[:, :, None], rows_of_t[:, None])
     q, second = _inverse([whole[3:] - part for whole, part in zip(moments, taken, strict=True)])
     balanced = [forces(rows_of_t.swapaxes(0, 1), of_a, q, dot(w, load[:, rows])) for load in loads]
-    return balanced, lengths, np.abs(first * second), well_conditioned(kernel, first, second)
+    large = (np.abs(first) > SMALL_DETERMINANT) & (np.abs(second) > SMALL_DETERMINANT * kernel.arm**3)
+    return balanced, lengths, np.abs(first * second), large
 
 
 def _inverse(matrix: Vector) -> tuple[FloatArray, FloatArray]:

@@ -6,7 +6,6 @@ route, which pivots.
 """
 
 from collections.abc import Iterator
-from dataclasses import replace
 from types import ModuleType
 
 import numpy as np
@@ -16,6 +15,7 @@ from toolpath_stiff.arrays import FloatArray, IntArray, product
 from toolpath_stiff.machine.model import Hexapod, MachineTool, as_hexapod
 from toolpath_stiff.stiffness import closed_form, element_sum, exact
 from toolpath_stiff.stiffness.contract import LoadPath
+from toolpath_stiff.stiffness.effects.platform_flexibility import PlatformFlexibility
 from toolpath_stiff.stiffness.element_sum import stance_of
 from toolpath_stiff.stiffness.model import StiffnessModel, acting_effects, load_path
 
@@ -33,11 +33,9 @@ def solver_of(machine: MachineTool) -> ModuleType:
 
 def is_closed_form(model: StiffnessModel) -> bool:
     """True if only struts on a rigid platform act, so that the closed form is valid."""
-    acting = replace(model, effects=acting_effects(model))
-    return (
-        isinstance(model.machine, Hexapod)
-        and acting.is_plain
-        and all(np.isinf(active.values["bar_stiffness"]) for active in acting.effects)
+    return isinstance(model.machine, Hexapod) and all(
+        type(active.effect) is PlatformFlexibility and np.isinf(active.values["bar_stiffness"])
+        for active in acting_effects(model)
     )
 
 

@@ -40,7 +40,7 @@ def tip_compliance(model: StiffnessModel, path: LoadPath) -> FloatArray:
 
 def compliance_along(model: StiffnessModel, path: LoadPath, direction: FloatArray) -> FloatArray:
     """(n,) m/N, displacement along unit vectors (n, 3), base axes, per force along them, effects under that load."""
-    along, loads = elements_along(stance_of(path), direction), None
+    along, loads = sum(energies(stance_of(path), direction), start=np.zeros(len(path))), None
     if model.effects:
         if model.load_dependent:
             loads = np.einsum("nri,ni->nr", element_rows(stance_of(path)), direction)
@@ -70,14 +70,6 @@ def added_by(effects: Iterable[ActiveEffect], path: LoadPath) -> tuple[FloatArra
 def element_rows(stance: Stance) -> FloatArray:
     """(n, r, 3) all loads of the elements, one after the other, per unit force at the tip in base axes."""
     return np.concatenate([load.rows(stance.position)[:, :, :3] for load in stance.loads], axis=1)
-
-
-def elements_along(stance: Stance, direction: FloatArray) -> FloatArray:
-    """(n,) m/N of the elements alone along unit vectors (n, 3), base axes."""
-    total = np.zeros(len(stance))
-    for energy in energies(stance, direction):
-        total += energy
-    return total
 
 
 def energies(stance: Stance, direction: FloatArray) -> list[FloatArray]:

@@ -75,11 +75,6 @@ class StiffnessModel:
         """True if the stiffness depends on the size of the load (it is then the secant one)."""
         return any(active.effect.load_dependent for active in self.effects)
 
-    @property
-    def is_plain(self) -> bool:
-        """True if there are only struts and platform bars, so that the fast kernels apply."""
-        return all(type(active.effect) is PlatformFlexibility for active in self.effects)
-
 
 def build_model(
     machine: MachineTool,

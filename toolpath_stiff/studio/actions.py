@@ -73,7 +73,7 @@ def _word(effect: tps.Effect, keys: Document) -> str:
 
 
 def _accept(session: Session) -> None:
-    fit = session.found("update")
+    fit = session.reply("update")
     if not fit or not fit.accepted:
         raise InputError("there is no fit that the data support", hint="switch an effect on and press Fit")
     session.case.accept(session.case.folder / fit.result / "machine.toml")

@@ -48,7 +48,7 @@ def document(session: Session) -> Document:
 
 def result(session: Session, kind: str) -> Document | None:
     """A result as its command writes it, with the folder that keeps it and the files made from it."""
-    latest = session.found(kind)
+    latest = session.reply(kind)
     if latest is None:
         return None
     return {**latest.document, "result": latest.result, "accepted": latest.accepted, "written": latest.file}
@@ -57,7 +57,7 @@ def result(session: Session, kind: str) -> Document | None:
 def machine(session: Session) -> Document:
     """Data for the drawing of the machine, and the boundary of its reach with the tool as it is at rest."""
     on, state = session.machine, session.case.state
-    model, key, analysis = on.model.machine, (state.machine, state.effects), session.found("analyze")
+    model, key, analysis = on.model.machine, (state.machine, state.effects), session.reply("analyze")
     tables = [*([session.readings()] if state.data else []), *([analysis.path] if analysis else [])]
 
     def poses() -> FloatArray:
@@ -176,9 +176,9 @@ def _setups(session: Session) -> list[str]:
 
 def program(session: Session) -> Document:
     """Text of the program and, once it has been analyzed, its path."""
-    state, analysis = session.case.state, session.found("analyze")
+    state, analysis = session.case.state, session.reply("analyze")
     lines = session.once("lines", session.program_key, lambda: list(session.case.program.lines))
-    path, shifted = analysis.path if analysis else None, session.found("compensate")
+    path, shifted = analysis.path if analysis else None, session.reply("compensate")
     if path and shifted:
         shift = np.interp(path["s_mm"], shifted.path["s_mm"], shifted.path["shift"])
         path = {**path, "shift": np.round(shift, 3).tolist()}

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import threading
 import webbrowser
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from toolpath_stiff.defaults import MACHINE
-from toolpath_stiff.errors import InputError
-from toolpath_stiff.files import is_file
+from toolpath_stiff.errors import InputError, TpsError
+from toolpath_stiff.files import is_file, writing_errors
 from toolpath_stiff.studio.preloading import prepared
 
 if TYPE_CHECKING:
@@ -33,6 +35,19 @@ def opened_case(folder: str, trust: Sequence[str], machine: str | None, exercise
     if exercise is not None:
         case.start_exercise(exercise)
     return case
+
+
+@contextmanager
+def removed_if_refused(folder: str) -> Iterator[None]:
+    """Remove a case's folder, if it is new, when a file that the case is to hold cannot be used."""
+    with writing_errors(folder, "open the case"):  # a name that is too long, a circle of links
+        new = not Path(folder).exists()
+    try:
+        yield
+    except TpsError:
+        if new:
+            shutil.rmtree(folder, ignore_errors=True)
+        raise
 
 
 def serve(case: Case, port: int = 0, *, browser: bool = True) -> int:

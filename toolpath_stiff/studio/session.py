@@ -49,14 +49,14 @@ class Session:
         self._version = self._beat = 0
         self._jobs: list[tuple[str, Document]] = []
         self._running: Job | None = None
-        self._found: dict[tuple[str, object], Reply] = {}  # kind and what it was found for -> what was found
+        self._replies: dict[tuple[str, object], Reply] = {}  # by kind and the state that it is for
         self._failed: dict[str, tuple[object, str]] = {}
         self._kept: dict[str, tuple[object, Any]] = {}  # name -> key, value: what is worked out once for a state
         for step in case.history:
             if step.kind in OF_READINGS and (document := self._document_of(step)):
                 accepted = (case.folder / step.result / "machine.toml").is_file()
                 reply = Reply(step.text, step.command, document, step.result, accepted)
-                self._found[step.kind, step.state.judged] = reply
+                self._replies[step.kind, step.state.judged] = reply
         self.follow_up()
 
     def _document_of(self, step: Step) -> Document | None:
@@ -144,15 +144,15 @@ class Session:
 
         return self.once("readings", (state.machine, state.data), make)
 
-    # What was found.
+    # Replies of finished work.
 
-    def found(self, kind: str) -> Reply | None:
+    def reply(self, kind: str) -> Reply | None:
         """Last result of a kind, if it still holds."""
-        return self._found.get((kind, self.key(kind)))
+        return self._replies.get((kind, self.key(kind)))
 
     def document(self, kind: str) -> Document | None:
         """Document of the last result of a kind, if it still holds."""
-        latest = self.found(kind)
+        latest = self.reply(kind)
         return latest.document if latest else None
 
     def failed(self, kind: str) -> str:
@@ -196,7 +196,7 @@ class Session:
         for kind in [*(["diagnose"] if state.data else []), *of_path]:
             busy = running and running.kind == kind and running.key == self.key(kind)
             waiting = kind in [waiting for waiting, _ in self._jobs]
-            if self.found(kind) is None and not busy and not self.failed(kind) and not waiting:
+            if self.reply(kind) is None and not busy and not self.failed(kind) and not waiting:
                 self._jobs.append((kind, {}))
         if not running and self._jobs:
             self._start(*self._jobs.pop(0))
@@ -204,7 +204,7 @@ class Session:
     def _start(self, kind: str, given: Document) -> None:
         first = ""
         if kind == "analyze":
-            fit = self.found("update")
+            fit = self.reply("update")
             given = {"machine": f"{fit.result}/machine.toml"} if fit and fit.accepted and self.is_fitted else {}
             first = [step.state.machine for step in self.case.history if step.kind in ("machine", "exercise")][-1]
         result = self.case.next_result(kind)
@@ -225,7 +225,7 @@ class Session:
 
     def _take(self, job: Job, answer: Reply) -> None:
         """Enter a finished job's result into the history; a fit or a drafted effect takes effect from now on."""
-        self._found[job.kind, job.key] = answer
+        self._replies[job.kind, job.key] = answer
         case, state = self.case, self.case.state
         known = [(step.kind, step.command) for step in case.history if step.state == state]
         if (job.kind, answer.command) not in known:  # a studio that resumes works some things out again

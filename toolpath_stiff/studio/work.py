@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 import toolpath_stiff as tps
-from toolpath_stiff.case.case import Case, find
+from toolpath_stiff.case.case import Case
+from toolpath_stiff.case.results import find
 from toolpath_stiff.documents import Document
 from toolpath_stiff.errors import TpsError
 from toolpath_stiff.report.curves import extremes_by_column
