@@ -281,7 +281,7 @@ def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, seed: in
         tried.append(pair)
     gates.tried = tuple(sorted(tried, key=lambda fit: (-fit.log_evidence, fit.name)))
     # The base model stays in the running if only the best candidate's gain speaks against it, not its residuals.
-    gates.none_stands = min(gates.base.squares_probability, gates.base.structure_probability) > ADEQUATE
+    gates.none_stands = gates.base.own_probability > ADEQUATE
     return gates
 
 
@@ -420,6 +420,8 @@ def put_to_vote(
             ballots = closest(ballots, votes(problem, fits[top], fair_rivals(problem, fits[top], base)))
             lost = {name for name, differences in ballots.items() if outvoted(differences)}
             open_rivals = [name for name in ballots if name not in lost]
+            if gates.by_name[top].probability <= FALSE_ALARM:  # it leaves more than the model alone may
+                open_rivals = open_rivals or [*ballots][:1]
             open_pairs = [pair for pair in gates.tried if pair.name in open_rivals and pair.name not in gates.fits]
             gates.fits |= {pair.name: refine(problem, pair) for pair in open_pairs}
             fits |= gates.fits
@@ -434,7 +436,8 @@ def put_to_vote(
     if verdict == "adequate" and len(standing) == 1 and not instead:
         return verdict, explanations, {}
     ballots = closest(ballots, of_law)
-    first, *others = dict.fromkeys([*standing, *instead])
+    # What noise would hide is told where the law had to move: it may stand for any of it.
+    first, *others = dict.fromkeys([*standing, *instead, *(explanations if instead and verdict == "adequate" else ())])
 
     def behind(name: str) -> tuple[bool, float]:
         """Sort key: votes; without votes (part of the first) the odds; beside a model that passes, chance alone."""
