@@ -193,7 +193,7 @@ class Update(FolderResult):
         names, of_instrument, law_free = self.model.fit.names, self.model.instruments, self.model.fit.law_free
         parts = [*names, *([LAW_REFITTED] if law_free else [])]
         if (chance := gate_of(self.task.problem, self.noise, self.model.fit, self.task.seed).probability) <= ADEQUATE:
-            clauses.append(f"{joined(parts)} does not explain the readings: p = {chance:.2g}")
+            clauses.append(f"the readings are not explained by {joined(parts)}: p = {chance:.2g}")
         if self.described and law_free:
             clauses.append("what was read off these readings needs another strut law, too")
         beside = f"{joined(parts)} together leave" if of_instrument and len(of_instrument) < len(parts) else ""
