@@ -436,8 +436,9 @@ def put_to_vote(
     if verdict == "adequate" and len(standing) == 1 and not instead:
         return verdict, explanations, {}
     ballots = closest(ballots, of_law)
-    # What noise would hide is told where the law had to move: it may stand for any of it.
-    first, *others = dict.fromkeys([*standing, *instead, *(explanations if instead and verdict == "adequate" else ())])
+    # What noise would hide is told where the law had to move, but for what its votes rule out.
+    hidden = [name for name in explanations if instead and verdict == "adequate" and name not in of_law]
+    first, *others = dict.fromkeys([*standing, *instead, *hidden])
 
     def behind(name: str) -> tuple[bool, float]:
         """Sort key: votes; without votes (part of the first) the odds; beside a model that passes, chance alone."""
