@@ -389,11 +389,11 @@ def put_to_vote(
     """Verdict and explanations (`decide`) after the votes of the readings, and the votes for the first explanation.
 
     What lowers no error at left-out points is no answer, nor is a second effect that lowers none, or that the form of
-    the first may stand for. A name that has not outvoted every rival of another part is one of several: beside it stand
-    those that are likely, the others and what a strut law that had to move may stand for, the closest votes first. A
-    model that passes is not the only explanation where its nuisances have taken up more than
-    they may, or where more may be left than an adequate one leaves; what the larger of two guessed noises would hide is
-    told instead.
+    the first may stand for. A name that has not outvoted every rival of another part, or leaves more than the model
+    alone may, is one of several: beside it stand those that are likely, the others and what a strut law that had to
+    move may stand for, the closest votes first. A model that passes is not the only explanation where its nuisances
+    have taken up more than they may, or where more may be left than an adequate one leaves; what the larger of two
+    guessed noises would hide is told instead.
     """
     verdict, explanations = decide(gates, probability)
     base, ballots, lost = candidates.base, dict[str, FloatArray](), set[str]()
@@ -412,16 +412,14 @@ def put_to_vote(
         if top == NONE and not gates.none_stands:
             return "unexplained", (), {}
         if top == NONE:
-            verdict, likely = "ambiguous", [*dict.fromkeys([*explanations, NONE])]
-            standing = likely
+            verdict, likely = "ambiguous", (standing := [*dict.fromkeys([*explanations, NONE])])
         else:
             rivals = {name: fit for name, fit in fits.items() if name != NONE or gates.none_stands}
             ballots = _votes_of_few(problem, candidates.families, fits[top], rivals_of(fits[top], rivals))
             ballots = closest(ballots, votes(problem, fits[top], fair_rivals(problem, fits[top], base)))
             lost = {name for name, differences in ballots.items() if outvoted(differences)}
-            open_rivals = [name for name in ballots if name not in lost]
-            if gates.by_name[top].probability <= FALSE_ALARM:  # it leaves more than the model alone may
-                open_rivals = open_rivals or [*ballots][:1]
+            lacking = gates.by_name[top].probability <= FALSE_ALARM
+            open_rivals = [name for name in ballots if name not in lost] or [*ballots][: int(lacking)]
             open_pairs = [pair for pair in gates.tried if pair.name in open_rivals and pair.name not in gates.fits]
             gates.fits |= {pair.name: refine(problem, pair) for pair in open_pairs}
             fits |= gates.fits
