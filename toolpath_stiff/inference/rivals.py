@@ -15,7 +15,7 @@ from toolpath_stiff.stiffness.contract import SETUP, Effect
 INSTRUMENT = "instrument"
 # Effects that carry the tip's whole force to the floor as one body on springs (`contract.body_on_springs`).
 ONE_BODY = ("table_compliance", "frame_sway")
-# Effects in series with every strut, which a wrong strut law may stand for: under one load contacts are a constant.
+# Effects in series with every strut, which a wrong strut law may stand for; all but the first under one load only.
 SERIES = ("joint_compliance", "contact_nonlinearity", "joint_clearance")
 TWINS = 0.05  # votes below which two explanations are the same to these readings
 UNSEEN = 5e-5  # of a mean error: half of the last digit that is printed
