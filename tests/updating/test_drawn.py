@@ -13,7 +13,7 @@ import pytest
 from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, dense, read_text
 from tests.updating.test_diagnose import SADDLE
-from toolpath_stiff.correction.task import UpdateTask
+from toolpath_stiff.correction.task import MACHINE, UpdateTask
 from toolpath_stiff.correction.update import update
 from toolpath_stiff.diagnosis.diagnose import common_verdict, diagnose, with_plan
 from toolpath_stiff.errors import InputError
@@ -22,7 +22,7 @@ from toolpath_stiff.inference.evidence import Problem
 from toolpath_stiff.inference.judgement import judge
 from toolpath_stiff.inference.left_out import held_out
 from toolpath_stiff.inference.noise import noise_models
-from toolpath_stiff.inference.prediction import Predictor
+from toolpath_stiff.inference.prediction import Predictor, scaled_law
 from toolpath_stiff.readings.measurements import reading_marks
 from toolpath_stiff.rig import case, exercise
 from toolpath_stiff.stiffness.catalogue import effects_from_file, find_effect
@@ -79,6 +79,10 @@ def test_an_update_by_them_says_so(described):
     assert "added as described, not as identified" in said["text"]
     (entry,) = found.corrected.effects
     assert entry.provenance["described"].startswith("not confirmed: ")
+    stiffer = nist().with_changes(strut_law=scaled_law(nist().strut_law, np.log([1.2, 1.2])))
+    found = update(UpdateTask(stiffer, DATA, ["saddle"], believe=MACHINE, effect_files=[file], files=["nist-table1"]))
+    assert found.steps[-1].fit.law_free and found.steps[-1].error < 0.5 * found.steps[0].error
+    assert found.verdict == "refused" and "needs another strut law" in found.text
 
 
 def test_readings_that_it_has_not_seen_confirm_it(tmp_path):

@@ -191,6 +191,9 @@ def test_the_gain_of_the_best_of_many_is_judged_against_the_best_of_many():
         simulator = simulator_of(k)
         signs = signatures(problem, [table for family in families for table in family.tables])
         gate = absolute_gate(problem, base.residual, base.jacobian, simulator, forms, signs, gain)
+        assert (
+            gate.own_probability == absolute_gate(problem, base.residual, base.jacobian, simulator, forms).probability
+        )
         thresholds.append(gain_threshold(problem, base.jacobian, simulator, signs))
         passed += gate.gain_probability <= 0.05
     single = float(chi2.ppf(0.90, 1))  # one-sided 5 % of one effect

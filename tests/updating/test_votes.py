@@ -11,7 +11,10 @@ from tests.stiffness.cases import nist
 from tests.updating.cases import campaign, diagnosed, examined, judged
 from toolpath_stiff.correction.task import MACHINE, UpdateTask
 from toolpath_stiff.correction.update import build_ladder
+from toolpath_stiff.diagnosis.words import why
+from toolpath_stiff.inference import judgement
 from toolpath_stiff.inference.fair_forms import fair_rivals
+from toolpath_stiff.inference.gates import absolute_gate
 from toolpath_stiff.inference.nuisances import findings, fitted_nuisances, nuisance_words
 from toolpath_stiff.inference.prequential import votes
 from toolpath_stiff.inference.rivals import SERIES, entries, place_of
@@ -56,7 +59,7 @@ def test_a_law_that_had_to_move_is_not_all_that_it_may_be(layout, hidden="joint_
 def test_entries_put_together_what_sits_at_one_place_and_reads_alike():
     found = diagnosed(7, "paper", "table_compliance", STRONG)
     fits = {family.name: family.best for family in found.main.families} | found.main.fits
-    named = [[c for name in names for c in fits[name].candidates if c.name != SERIES] for names in found.entries]
+    named = [[c for name in names for c in fits[name].candidates if c.name not in SERIES] for names in found.entries]
     # One place, but for a stand that gives as a frame does: the same to every reading of the tip.
     places = [{place_of(c.effect) for c in candidates if c.name != "stand_compliance"} for candidates in named]
     assert all(len(place) <= 1 for place in places)
@@ -101,6 +104,21 @@ def test_a_name_has_outvoted_every_rival_and_says_by_how_much():
     assert f"{document['votes'][0]['rival']} predicts pose after pose worse by" in document["text"]
     rivals = {entry["effect"]: entry["vote"] for entry in document["candidates"]}
     assert rivals["weak_strut"] is None and rivals["table_compliance"]["gain"] > SMALL
+
+
+def test_a_name_that_leaves_more_than_the_model_alone_may_stands_beside_the_closest_rival(monkeypatch):
+    found = diagnosed(7, "paper", "weak_strut", STRONG)
+    monkeypatch.setattr(
+        judgement,
+        "absolute_gate",
+        lambda *args: replace(gate := absolute_gate(*args), probability=min(gate.probability, 0.05)),
+    )
+    effects = [find_effect(name) for name in ("weak_strut", "table_compliance", "gauge_scale")]
+    again = judgement.judge(found.main.problem, found.noise, effects, seed=0)
+    assert again.verdict == "ambiguous" and again.explanations == ("weak_strut", next(iter(again.votes)))
+    assert all(map(outvoted, again.votes.values()))
+    text = why(replace(found, verdict="ambiguous", judgements={"": again}, main=again))
+    assert any("weak_strut leaves more than noise would (p = 0.05)" in reason for reason in text)
 
 
 def test_untilted_a_table_is_a_tool_whose_axes_differ():

@@ -17,11 +17,12 @@ from toolpath_stiff.diagnosis.examination import percent_of, rounded_errors
 from toolpath_stiff.documents import Document, json_number, to_dict
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content, write_atomically
-from toolpath_stiff.inference.doubts import question
+from toolpath_stiff.inference.doubts import gate_of, question
 from toolpath_stiff.inference.drawn import Drawn
 from toolpath_stiff.inference.error_model import error_model
 from toolpath_stiff.inference.errors import LAW_REFITTED, errors_text
 from toolpath_stiff.inference.evidence import Fit
+from toolpath_stiff.inference.judgement import ADEQUATE
 from toolpath_stiff.inference.left_out import gain_in_standard_errors
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.machine.error_model import GEOMETRY, ErrorModel
@@ -169,7 +170,8 @@ class Update(FolderResult):
     def rises(self) -> list[str]:
         """Conditions under which left-out points are predicted worse than as given, beyond chance; insufficient forms.
 
-        Load, set-up and tool: a path is under one of each as a whole, and what falls on average may rise there.
+        Load, set-up and tool: a path is under one of each as a whole, and what falls on average may rise there. What a
+        diagnosis would rule out (`gates`) stands in for something else.
         """
         data, first, last = self.task.data.of_tip, self.steps[0].held, self.model.held
         conditions = {
@@ -187,9 +189,14 @@ class Update(FolderResult):
                     clauses.append(f"{words.format(value)} the error at left-out points rises, {change}")
         left, floor = 100 * last.mean_error, self.noise.floor_percent
         # A form that leaves more than scatter stands in for something else, which acts differently elsewhere; what
-        # an instrument's error leaves would be taken for the machine's.
-        names, of_instrument = self.model.fit.names, self.model.instruments
-        beside = f"{joined(names)} together leave" if of_instrument and len(of_instrument) < len(names) else ""
+        # an instrument's error leaves would be taken for the machine's. So does one beside which the law has to move.
+        names, of_instrument, law_free = self.model.fit.names, self.model.instruments, self.model.fit.law_free
+        parts = [*names, *([LAW_REFITTED] if law_free else [])]
+        if (chance := gate_of(self.task.problem, self.noise, self.model.fit, self.task.seed).probability) <= ADEQUATE:
+            clauses.append(f"the readings are not explained by {joined(parts)}: p = {chance:.2g}")
+        if self.described and law_free:
+            clauses.append("what was read off these readings needs another strut law, too")
+        beside = f"{joined(parts)} together leave" if of_instrument and len(of_instrument) < len(parts) else ""
         of = "what was read off these readings leaves" if self.described else beside
         if of and left > LACKING * floor:
             clauses.append(f"{of} {left:.2f} % at left-out points, scatter {floor:.2f} %")
@@ -386,6 +393,11 @@ class Update(FolderResult):
             "as given, nothing is fitted, so leaving points out changes nothing: where the machine file's figures were "
             "fitted to these readings, its error at left-out points looks better than it is",
         ]
+        loads = np.unique(self.task.data.of_tip.force)
+        if self.changed and len(loads) == 1:
+            sentences.append(
+                f"all readings are under {loads[0]:g} N; at other loads the stiffness is taken to be the same"
+            )
         if self.search:
             return [
                 *sentences,

@@ -230,6 +230,9 @@ def _not_told_apart(diagnosis: Diagnosis) -> list[str]:
     """Reasons why the plausible effects cannot be told apart."""
     rivals = [(name, votes) for name, votes in diagnosis.main.votes.items() if not outvoted(votes) and name != NONE]
     reasons = [f"{vote_words(*rival)} (log probability): not beyond chance" for rival in rivals[:MOST_BESIDE]]
+    gate = diagnosis.main.gates.get(diagnosis.best or "")
+    if gate is not None and gate.probability <= FALSE_ALARM:
+        reasons.append(f"{diagnosis.best} leaves more than noise would (p = {gate.probability:.2g}): it may be none")
     effects = [family.effect for family in diagnosis.main.families if family.name in diagnosis.plausible]
     reasons += [f"{reading_words(telling(effect))} would tell {effect.name}" for effect in effects]
     if NONE in diagnosis.plausible:

@@ -61,6 +61,7 @@ def instead_of_law(problem: Problem, fit: Fit) -> tuple[dict[str, Fit], Votes]:
     given = with_given_law(problem, fit)
     if not outvoted(votes(problem, fit, {fit.name: given})[fit.name]):
         return {}, {}
-    rivals = {rival.name: rival for rival in rivals_of_law(problem, given, (SERIES, *ONE_BODY)).values()}
+    series = SERIES if np.ptp(problem.predictor.data.force) == 0.0 else SERIES[:1]
+    rivals = {rival.name: rival for rival in rivals_of_law(problem, given, (*series, *ONE_BODY)).values()}
     ballots = votes(problem, fit, rivals)
     return {name: rivals[name] for name in ballots if not outvoted(ballots[name])}, ballots

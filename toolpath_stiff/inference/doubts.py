@@ -3,7 +3,7 @@
 import numpy as np
 
 from toolpath_stiff.inference.discrepancies import discrepancy_forms
-from toolpath_stiff.inference.evidence import LAW_PRIOR, Problem
+from toolpath_stiff.inference.evidence import LAW_PRIOR, Fit, Problem
 from toolpath_stiff.inference.gates import Forms, Gate, absolute_gate, simulate
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.inference.prediction import Predictor
@@ -85,6 +85,11 @@ def _gate_at(problem: Problem, noise: Noise, factor: float, seed: int) -> Gate:
     """Absolute test of the model alone under `factor` times the noise."""
     larger = noise.times(factor)
     scaled = Problem.of(problem.predictor, larger)
-    base, draws = scaled.score_base(), simulate(larger, scaled.scatter.covariance, seed)
-    forms = Forms(discrepancy_forms(problem.predictor), scaled.scatter.precision)
-    return absolute_gate(scaled, base.residual, base.jacobian, draws, forms)
+    return gate_of(scaled, larger, scaled.score_base(), seed)
+
+
+def gate_of(problem: Problem, noise: Noise, fit: Fit, seed: int) -> Gate:
+    """Absolute test of a fit."""
+    draws = simulate(noise, problem.scatter.covariance, seed)
+    forms = Forms(discrepancy_forms(problem.predictor), problem.scatter.precision)
+    return absolute_gate(problem, fit.residual, fit.jacobian, draws, forms)

@@ -38,8 +38,8 @@ class Gate:
 
     Attributes
     ----------
-    probability
-        Of residuals that look worse than these if the model were right.
+    probability, own_probability
+        Of residuals that look worse than these if the model were right; the same whatever any candidate gains.
     squares, simulated
         Weighted sum of squares, and (DRAWS,) simulated ones.
     structure_probability, worst
@@ -54,6 +54,7 @@ class Gate:
     squares_probability: float
     structure_probability: float
     worst: str
+    own_probability: float
     gain_probability: float = 1.0
 
 
@@ -193,14 +194,16 @@ def absolute_gate(
     if signatures:
         looks.append(np.concatenate([[gain], largest_gain(pulls, projected, signatures)]))
     ranked = np.stack([_tail(look, look[1:]) for look in looks], axis=1)
-    smallest = ranked.min(axis=1)
+    smallest = np.minimum.accumulate(ranked, axis=1)[:, 1:]
+    chances = np.maximum((smallest[1:] <= smallest[0] + 1e-12).mean(axis=0), 0.5 / len(squares)).tolist()
     return Gate(
-        float(max((smallest[1:] <= smallest[0] + 1e-12).mean(), 0.5 / len(squares))),
+        chances[-1],
         observed_squares,
         squares,
         squares_probability=float(ranked[0, 0]),
         structure_probability=float(ranked[0, 1]),
         worst=forms.names[int(np.argmax(seen[0]))] if forms.names else "",
+        own_probability=chances[0],
         gain_probability=float(ranked[0, 2]) if signatures else 1.0,
     )
 

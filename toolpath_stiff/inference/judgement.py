@@ -281,7 +281,7 @@ def apply_gates(problem: Problem, noise: Noise, candidates: Candidates, seed: in
         tried.append(pair)
     gates.tried = tuple(sorted(tried, key=lambda fit: (-fit.log_evidence, fit.name)))
     # The base model stays in the running if only the best candidate's gain speaks against it, not its residuals.
-    gates.none_stands = min(gates.base.squares_probability, gates.base.structure_probability) > ADEQUATE
+    gates.none_stands = gates.base.own_probability > ADEQUATE
     return gates
 
 
@@ -389,11 +389,11 @@ def put_to_vote(
     """Verdict and explanations (`decide`) after the votes of the readings, and the votes for the first explanation.
 
     What lowers no error at left-out points is no answer, nor is a second effect that lowers none, or that the form of
-    the first may stand for. A name that has not outvoted every rival of another part is one of several: beside it stand
-    those that are likely, the others and what a strut law that had to move may stand for, the closest votes first. A
-    model that passes is not the only explanation where its nuisances have taken up more than
-    they may, or where more may be left than an adequate one leaves; what the larger of two guessed noises would hide is
-    told instead.
+    the first may stand for. A name that has not outvoted every rival of another part, or leaves more than the model
+    alone may, is one of several: beside it stand those that are likely, the others and what a strut law that had to
+    move may stand for, the closest votes first. A model that passes is not the only explanation where its nuisances
+    have taken up more than they may, or where more may be left than an adequate one leaves; what the larger of two
+    guessed noises would hide is told instead.
     """
     verdict, explanations = decide(gates, probability)
     base, ballots, lost = candidates.base, dict[str, FloatArray](), set[str]()
@@ -412,14 +412,14 @@ def put_to_vote(
         if top == NONE and not gates.none_stands:
             return "unexplained", (), {}
         if top == NONE:
-            verdict, likely = "ambiguous", [*dict.fromkeys([*explanations, NONE])]
-            standing = likely
+            verdict, likely = "ambiguous", (standing := [*dict.fromkeys([*explanations, NONE])])
         else:
             rivals = {name: fit for name, fit in fits.items() if name != NONE or gates.none_stands}
             ballots = _votes_of_few(problem, candidates.families, fits[top], rivals_of(fits[top], rivals))
             ballots = closest(ballots, votes(problem, fits[top], fair_rivals(problem, fits[top], base)))
             lost = {name for name, differences in ballots.items() if outvoted(differences)}
-            open_rivals = [name for name in ballots if name not in lost]
+            lacking = gates.by_name[top].probability <= FALSE_ALARM
+            open_rivals = [name for name in ballots if name not in lost] or [*ballots][: int(lacking)]
             open_pairs = [pair for pair in gates.tried if pair.name in open_rivals and pair.name not in gates.fits]
             gates.fits |= {pair.name: refine(problem, pair) for pair in open_pairs}
             fits |= gates.fits
@@ -434,7 +434,9 @@ def put_to_vote(
     if verdict == "adequate" and len(standing) == 1 and not instead:
         return verdict, explanations, {}
     ballots = closest(ballots, of_law)
-    first, *others = dict.fromkeys([*standing, *instead])
+    # What noise would hide is told where the law had to move, but for what its votes rule out.
+    hidden = [name for name in explanations if instead and verdict == "adequate" and name not in of_law]
+    first, *others = dict.fromkeys([*standing, *instead, *hidden])
 
     def behind(name: str) -> tuple[bool, float]:
         """Sort key: votes; without votes (part of the first) the odds; beside a model that passes, chance alone."""

@@ -15,7 +15,8 @@ from toolpath_stiff.stiffness.contract import SETUP, Effect
 INSTRUMENT = "instrument"
 # Effects that carry the tip's whole force to the floor as one body on springs (`contract.body_on_springs`).
 ONE_BODY = ("table_compliance", "frame_sway")
-SERIES = "joint_compliance"  # the effect that a wrong strut law may stand for, in series with every strut
+# Effects in series with every strut, which a wrong strut law may stand for; all but the first under one load only.
+SERIES = ("joint_compliance", "contact_nonlinearity", "joint_clearance")
 TWINS = 0.05  # votes below which two explanations are the same to these readings
 UNSEEN = 5e-5  # of a mean error: half of the last digit that is printed
 
@@ -91,7 +92,7 @@ def entries(problem: Problem, fits: Mapping[str, Fit], names: Sequence[str]) -> 
 
 def _alike(problem: Problem, fit: Fit, other: Fit) -> bool:
     def places(fit: Fit) -> list[str]:
-        return sorted(place_of(c.effect) for c in fit.candidates if fit.law_free or c.name != SERIES)
+        return sorted(place_of(c.effect) for c in fit.candidates if fit.law_free or c.name not in SERIES)
 
     apart = float(problem.scatter.precision.squares(fit.residual - other.residual))
     twins = TWINS if fit.candidates and other.candidates else 0.0
