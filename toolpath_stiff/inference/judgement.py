@@ -25,7 +25,7 @@ unexplained   something is missing, and nothing in the catalogue accounts for it
               they were of this machine at all (`question`)
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import comb
 
@@ -412,7 +412,8 @@ def put_to_vote(
         if top == NONE and not gates.none_stands:
             return "unexplained", (), {}
         if top == NONE:
-            verdict, likely = "ambiguous", (standing := [*dict.fromkeys([*explanations, NONE])])
+            verdict, standing = "ambiguous", [*dict.fromkeys([*explanations, NONE])]
+            likely = standing
         else:
             rivals = {name: fit for name, fit in fits.items() if name != NONE or gates.none_stands}
             ballots = _votes_of_few(problem, candidates.families, fits[top], rivals_of(fits[top], rivals))
@@ -436,7 +437,19 @@ def put_to_vote(
     ballots = closest(ballots, of_law)
     # What noise would hide is told where the law had to move, but for what its votes rule out.
     hidden = [name for name in explanations if instead and verdict == "adequate" and name not in of_law]
-    first, *others = dict.fromkeys([*standing, *instead, *hidden])
+    order = dict.fromkeys([*standing, *instead, *hidden])
+    return (
+        "ambiguous" if instead or verdict == "adequate" else verdict,
+        shortened(problem, fits | instead, _closest_first([*order], verdict, ballots, lost, probability)),
+        ballots,
+    )
+
+
+def _closest_first(
+    names: Sequence[str], verdict: str, ballots: Votes, lost: Container[str], probability: Mapping[str, float]
+) -> list[str]:
+    """Explanations with the first one first and the others as close to it as the readings have them."""
+    first, *others = names
 
     def behind(name: str) -> tuple[bool, float]:
         """Sort key: votes; without votes (part of the first) the odds; beside a model that passes, chance alone."""
@@ -446,12 +459,7 @@ def put_to_vote(
             return False, -np.inf if name in TAKEN_UP else np.inf
         return False, float(np.log(max(probability.get(first, 0.0), 1e-300) / max(probability.get(name, 0.0), 1e-300)))
 
-    order = [first, *sorted(others, key=behind)]
-    return (
-        "ambiguous" if instead or verdict == "adequate" else verdict,
-        shortened(problem, fits | instead, order),
-        ballots,
-    )
+    return [first, *sorted(others, key=behind)]
 
 
 def _votes_of_few(
