@@ -6,7 +6,8 @@ springs; pairs 10 and 5 %. A verdict's first explanation is added, or a draft; w
 finds. `believed`: the same with `--believe machine`, for faults of the machine. Errors are means along 24 poses amid
 those measured, X, Y, Z, against the true stiffness; 12 more lie beyond. A pose that a machine as written does not reach
 is left out of both errors, and counted. Of `known` cases, half of them sound, nothing is to be found: the effect is
-added by its name, to judge the bands alone. All machines weigh alike in the shares that bands hold. A `draft` is made
+added by its name, to judge the bands alone. All machines weigh alike in the shares that bands hold; that of the weakest
+place is the interval of the lowest stiffness along the path, of each axis, wherever it lies. A `draft` is made
 of every other clamping of a tilted campaign and put to all readings, and to those of the same machine without what it
 was read off (`gone`).
 """
@@ -15,7 +16,7 @@ import argparse
 import sys
 from collections import Counter
 from collections.abc import Callable, Sequence
-from statistics import fmean, median
+from statistics import fmean, median, pstdev
 
 from benchmarks.bars import Figure, Record, middle_of, share
 from benchmarks.built_cases import BUILT, GROUPS, JUDGED, SERIES, diagnosed, links_of_effects, make_jobs
@@ -135,7 +136,9 @@ def figures_of(built: str, records: Sequence[Record]) -> list[Figure]:
             if held := [r[key] for r in some if r.get(key) is not None]:
                 value, ends = fmean(held), f"{100 * low:g} to {100 * high:g} %"
                 words = f"{100 * value:.1f} % of {len(held)} machines"
-                made.append(Figure(built, f"{of} {what}", words, "", ends, low <= value <= high))
+                reach = 1.96 * pstdev(held) / len(held) ** 0.5  # machine by machine: places of one err together
+                between = f"{100 * (value - reach):.1f} to {min(100 * (value + reach), 100):.1f} %"
+                made.append(Figure(built, f"{of} {what}", words, between, ends, low <= value <= high))
     cpu = middle_of(built, "CPU of `diagnose`, median", [r["cpu"] for r in judged], None, " s")
     return [figure for figure in (*made, *medians, cpu) if figure.value != "no cases"]
 

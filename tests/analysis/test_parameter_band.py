@@ -6,8 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
+from scipy.stats import multivariate_normal, norm
 
 from toolpath_stiff.analysis.results import analyze
+from toolpath_stiff.analysis.uncertainty import ParameterBand
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.machine.error_model import ErrorModel, coordinates
 from toolpath_stiff.machine.file import load_machine
@@ -160,6 +163,56 @@ def test_the_band_widens_away_from_the_measured_poses_and_says_so(program):
         # What the model lacks is alike along one axis, half of it elsewhere: it averages out in part.
         weight = np.where(found.counted, found.samples.weight, 0.0)
         assert found.parameter_band.deviation_of_mean(weight) < 0.9 * found.parameter_band.deviation.max()
+
+
+def band_of(factors, form, x_m=0.0):
+    """A band of samples at x (n,), loaded along Z."""
+    n, place = len(form), np.zeros((len(form), 6))
+    place[:, 0] = x_m
+    none = np.zeros(n, dtype=bool)
+    return ParameterBand(("a",), np.asarray(factors), np.asarray(form), none, place, np.tile([0.0, 0.0, 1.0], (n, 1)))
+
+
+def independent(means, deviations):
+    """Interval of the smallest of independent normals: none of them is below it."""
+    return [
+        brentq(lambda x, p=p: norm.logsf(x, means, deviations).sum() - np.log1p(-p), -100.0, 200.0)
+        for p in (0.025, 0.975)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("means", "deviations"),
+    [(np.full(10, 100.0), np.full(10, 1.0)), ([100.0, 103.0, 120.0], [1.0, 5.0, 0.1]), ([100.0], [2.0])],
+)
+def test_the_lowest_of_independent_samples(means, deviations):
+    """Also where the modelled lowest is not: one of 103 +- 5 reaches further down than one of 100 +- 1."""
+    sd, ends = band_of(np.diag(deviations), np.zeros(len(means))).of_lowest(np.array(means), np.ones(len(means)))
+    # A quantile of 1000 draws is known to 0.085 standard deviations: four of these, of the widest.
+    assert ends == pytest.approx(independent(means, deviations), abs=0.35 * max(deviations))
+    assert len(means) > 1 or (sd, *ends) == pytest.approx((2.0, 100.0 - 3.919928, 100.0 + 3.919928))
+
+
+def test_the_lowest_of_samples_that_are_off_together():
+    """Errors that all share move the lowest as they move each: no draws are seen in it."""
+    band, stiffness = band_of(np.ones((4, 1)), np.zeros(4)), np.array([104.0, 90.0, 101.0, 108.0])
+    sd, ends = band.of_lowest(stiffness, np.ones(4))
+    assert (sd, *ends) == pytest.approx((1.0, 90.0 - 1.959964, 90.0 + 1.959964))
+    assert band.of_lowest(stiffness, np.array([1.0, 0.0, 1.0, 1.0]))[1].mean() == pytest.approx(101.0)
+
+
+def test_the_lowest_of_two_places_whose_form_is_half_common():
+    """Smaller of two normals correlated by a half (Nadarajah and Kotz 2008, IEEE Trans. VLSI 16, 210)."""
+    both, weight = np.array([100.0, 100.0]), np.ones(2)
+    sd, ends = band_of(np.zeros((2, 1)), np.ones(2), np.array([0.0, 90.0])).of_lowest(both, weight)
+    assert sd == pytest.approx(np.sqrt(1.0 - 0.5 / np.pi), abs=0.09)  # 4 / sqrt(2 x 1000)
+    pair = multivariate_normal([0.0, 0.0], [[1.0, 0.5], [0.5, 1.0]])
+    expected = [brentq(lambda x, p=p: pair.cdf([-x, -x]) - 1.0 + p, -5.0, 5.0) for p in (0.025, 0.975)]
+    assert ends - 100.0 == pytest.approx(expected, abs=0.35)
+    # At one place they are the same, but for what keeps their correlation from being singular.
+    assert band_of(np.zeros((2, 1)), np.ones(2)).of_lowest(both, weight)[1] == pytest.approx(
+        [100.0 - 1.959964, 100.0 + 1.959964], abs=1e-3
+    )
 
 
 def test_no_such_parameter():

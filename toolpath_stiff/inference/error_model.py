@@ -2,14 +2,15 @@
 
 The logarithm of the true stiffness differs from a fit's by three errors, whose sizes are read from the readings:
 
-    scatter    of readings and clampings, which law and sizes have taken up: times `SCATTERS` of the noise model;
+    scatter    of readings and clampings, which law and sizes have taken up: times `SCATTERS` of the noise model, with
+               its clampings times `CLAMPINGS` beside that: all clampings tell of them, not only the repeated ones;
     geometry   struts that are not alike, joints off their places: times `GEOMETRIES` of what the noise model assumes.
                They belong to the machine: where law and sizes have taken them up they are no error, elsewhere they are.
                Of a machine that has them where they most likely are (`as_built`): what readings leave unknown of them,
                and the scatter that they have taken up;
     form       what neither describes (links that the model takes for rigid, too), smooth over poses and different by
-               direction, of `FORMS` (relative sd). An effect that is added was chosen for fitting these readings, and
-               its form is its part's only nearly: what it changes is off by some `SHARE` of it.
+               direction, of `FORMS` (relative sd). An effect that is added was chosen for fitting these readings: its
+               form is its part's, or only nearly, and what it changes is off by some `SHARE` of it.
 
 A quarter of the measured poses is left out at a time, a region each, for a reading whose neighbours were fitted tells
 little of what is away from all of them. The sizes count by how likely they make the errors there: with four to eight
@@ -18,7 +19,7 @@ Gammerman and Shafer 2005, Algorithmic Learning in a Random World, 4.2), and it 
 scatter, not for the stiffness under it.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from math import erfc
 
@@ -34,14 +35,16 @@ from toolpath_stiff.machine.error_model import GEOMETRY, ErrorModel, alike, coor
 from toolpath_stiff.readings.measurements import Readings
 
 # Grid of sizes and their priors; assumed. The scatter is known to the noise model's degrees of
-# freedom (with Student's tails, for it may be wrong altogether); the geometry's tolerances are guesses, to a factor of
-# 2 or 3; the form is right with even odds, else off by a quarter of a per cent to 8 %, all orders alike.
+# freedom (with Student's tails, for it may be wrong altogether); clamping to a factor of 2, for it comes from the few
+# clampings that were repeated, and rather too large (`repeats`); the geometry's tolerances are guesses, to a factor of
+# 2 or 3; the form is right with even odds, else off by about what the noise model takes rigid links to give (`rest`),
+# and by a share of what effects change beside it, to a factor of 3 (one standard deviation): constants along axes stand
+# for parts that are no springs.
 SCATTERS = np.geomspace(0.5, 3.0, 13)
+CLAMPINGS, CLAMPING_FACTOR = (0.35, 0.6, 1.0, 1.7), 2.0
 GEOMETRIES = {0.0: 1.0, 0.35: 1.0, 0.7: 1.0, 1.0: 1.0, 1.4: 0.5, 2.0: 0.25}
-FORMS = {0.0: 3.0, 0.0025: 0.5, 0.005: 0.5, 0.01: 0.5, 0.02: 0.5, 0.04: 0.5, 0.08: 0.5}
-# Share of what effects change by which their forms are expected to be off, and the factor of one standard deviation of
-# that; assumed: constants along axes stand for parts that are no springs.
-SHARE, SHARE_FACTOR = 0.05, 3.0
+FORMS = (0.0, 0.0025, 0.005, 0.01, 0.02, 0.04, 0.08)
+SHARE, FORM_FACTOR = 0.05, 3.0
 FEWEST_PLACES, HALVINGS = 8, 2  # fewest distinct poses; number of times regions are halved
 MOST_READINGS = 400  # spread over the campaign, from which the sizes are read
 MOST_DIRECTIONS, FORM_IN_AXES = 12, 0.01  # along which a region's errors may be other than scatter; by what form
@@ -68,26 +71,25 @@ def error_model(
     jacobian, residual, covariance = fit.jacobian[rows], fit.residual[rows], fit.scatter.covariance
     common = covariance.groups.spread(covariance.common)
     same = covariance.groups.of[rows, None] == covariance.groups.of[rows]
-    parts = (
-        np.diag(covariance.own_variance[rows]) + common[rows] * same,
-        shared[:, rows].T @ shared[:, rows],
-        alike(place[rows], data.direction[rows]),
-    )
-    moved = covariance.shared[:, rows]
-    assumed = parts[0] + moved.T @ moved
-    sizes = np.stack([axis.ravel() for axis in np.meshgrid(SCATTERS, [*GEOMETRIES], [*FORMS], indexing="ij")], axis=1)
+    single, clamped, moved = np.diag(covariance.own_variance[rows]), common[rows] * same, covariance.shared[:, rows]
+    wrong = (shared[:, rows].T @ shared[:, rows], alike(place[rows], data.direction[rows]))
+    assumed = single + clamped + moved.T @ moved
+    sizes = np.stack([axis.ravel() for axis in np.meshgrid(SCATTERS, [*GEOMETRIES], FORMS, indexing="ij")], axis=1)
     beyond = np.log(SCATTERS) / np.sqrt(0.5 / noise.freedom)
     expected = (1.0 + beyond**2 / TAILS) ** (-0.5 * (TAILS + 1.0))
-    prior = expected[:, None, None] * np.array([*GEOMETRIES.values()])[:, None] * _expected_forms(fit)
-    log_weights, away = np.log(prior.ravel()), list[FloatArray]()
+    prior = expected[:, None, None] * np.array([*GEOMETRIES.values()])[:, None] * _expected_forms(fit, noise.rest)
+    of_clamping = -0.5 * (np.log(CLAMPINGS) / np.log(CLAMPING_FACTOR)) ** 2
+    log_weights, away = of_clamping[:, None, None, None] + np.log(prior), list[FloatArray]()
     for out in regions(place[rows], data.point[rows]):
         left = _left_out(out, jacobian, assumed, fit.law_free, moved)
-        log_weights += _log_likelihoods(left @ residual, [left @ part @ left.T for part in parts], sizes**2)
-        away.append(np.diag(left @ parts[2] @ left.T))
-    weights = np.exp(log_weights - log_weights.max())
-    weights /= weights.sum()
+        of_single, of_clamps, *of_wrong = (left @ part @ left.T for part in (single, clamped, *wrong))
+        log_weights += [_log_likelihoods(left @ residual, of_single + c**2 * of_clamps, *of_wrong) for c in CLAMPINGS]
+        away.append(np.diag(of_wrong[1]))
+    likely = np.exp(log_weights - log_weights.max())
+    likely /= likely.sum()
+    weights, clamping = likely.sum(axis=0).ravel(), likely.sum(axis=(1, 2, 3)) @ np.square(CLAMPINGS)
 
-    precision = replace(covariance, shared=shared[:0]).precision
+    precision = replace(covariance, shared=shared[:0], common=clamping * covariance.common).precision
     weighted = precision.times(fit.jacobian.T)
     certain = scaled_inverse(weighted @ fit.jacobian + law_prior(len(weighted), fit.law_free))
     own, geometry = _root(certain), certain @ (weighted @ shared.T)
@@ -98,7 +100,7 @@ def error_model(
     by_scatter, untold = told / (1.0 + told) ** 2, 1.0 / (1.0 + told) ** 2
     offsets = ((left @ vectors) ** 2).mean(axis=0)
     every = _left_out(rows[:0], jacobian, assumed, fit.law_free, moved)
-    near = float(np.diag(every @ parts[2] @ every.T).mean())
+    near = float(np.diag(every @ wrong[1] @ every.T).mean())
     far = max(float(np.concatenate(away).mean()), near)
     of_parameters = float(((fit.jacobian @ own) ** 2).sum(axis=1).mean())
     factor = _coverage_factor(weights, sizes**2 @ [of_parameters + by_scatter @ offsets, untold @ offsets, near])
@@ -120,16 +122,14 @@ def _learned(left: FloatArray, vectors: FloatArray) -> FloatArray:
     return kernel.features(MOST_LEARNED).T * np.sqrt(mean) if mean > ROUNDING else np.zeros((1, len(left)))
 
 
-def _expected_forms(fit: Fit) -> FloatArray:
-    """(forms,) prior weights of `FORMS`, by the change that effects of the machine make."""
+def _expected_forms(fit: Fit, rest: float) -> FloatArray:
+    """(forms,) prior weights of `FORMS`, by what rigid links give and what effects of the machine change."""
     owners = [candidate for candidate in fit.candidates for _ in candidate.components]
     sizes = [0.0 if owners[i].effect.is_instrument else fit.parts[i][1] for i in fit.free]
     change = float(np.sqrt(np.mean((fit.jacobian[:, 2:] @ np.array(sizes)) ** 2)))
-    if not change > 0.0:
-        return np.array([*FORMS.values()])
-    forms = np.array([*FORMS])
-    deviates = np.log(np.maximum(forms, 1e-12) / (SHARE * change)) / np.log(SHARE_FACTOR)
-    return np.asarray(np.exp(-0.5 * deviates**2) + np.finfo(float).tiny)
+    deviates = np.log(np.array(FORMS[1:]) / np.hypot(rest, SHARE * change)) / np.log(FORM_FACTOR)
+    weights = np.exp(-0.5 * deviates**2)
+    return np.concatenate([[weights.sum()], weights])
 
 
 def _apart(fit: Fit, given: Fit) -> FloatArray:
@@ -174,23 +174,27 @@ def _left_out(
     return left
 
 
-def _log_likelihoods(error: FloatArray, parts: Sequence[FloatArray], squares: FloatArray) -> FloatArray:
-    """(g,) log likelihoods of errors (m,) whose covariance is the sum of three parts (m, m) times `squares` (g, 3)."""
-    lower = np.linalg.cholesky(parts[0])
+def _log_likelihoods(error: FloatArray, scatter: FloatArray, geometry: FloatArray, form: FloatArray) -> FloatArray:
+    """(scatters, geometries, forms) log likelihoods of errors (m,), whose covariance is the sum of three (m, m).
+
+    Each is times a square of the grid of sizes.
+    """
+    lower = np.linalg.cholesky(scatter)
 
     def white(part: FloatArray) -> FloatArray:
         return np.asarray(np.linalg.solve(lower, np.linalg.solve(lower, part).T))
 
-    geometry, form, whitened = white(parts[1]), white(parts[2]), np.linalg.solve(lower, error)
+    geometry, form, whitened = white(geometry), white(form), np.linalg.solve(lower, error)
     # Along all other directions scatter dominates.
     axes = np.linalg.eigh(geometry + FORM_IN_AXES**2 * form)[1][:, -MOST_DIRECTIONS:]
     along = axes.T @ whitened
-    whitened_parts = np.stack([np.eye(len(along)), axes.T @ geometry @ axes, axes.T @ form @ axes])
-    covariance = np.tensordot(squares, whitened_parts, axes=1)
-    weighted = np.linalg.solve(covariance, np.broadcast_to(along[:, None], (len(squares), len(along), 1)))[..., 0]
-    scatter, rest = squares[:, 0], float(whitened @ whitened - along @ along)
-    of_rest = rest / scatter + (len(error) - len(along)) * np.log(scatter)
-    return np.asarray(-0.5 * (np.linalg.slogdet(covariance)[1] + weighted @ along + of_rest))
+    squares = np.square([*GEOMETRIES])[:, None, None, None], np.square(FORMS)[:, None, None]
+    values, vectors = np.linalg.eigh(squares[0] * (axes.T @ geometry @ axes) + squares[1] * (axes.T @ form @ axes))
+    scatters = np.square(SCATTERS)[:, None, None]
+    widths = scatters[..., None] + values
+    of_axes = (np.log(widths) + (along @ vectors) ** 2 / widths).sum(axis=-1)
+    of_rest = float(whitened @ whitened - along @ along) / scatters + (len(error) - len(along)) * np.log(scatters)
+    return np.asarray(-0.5 * (of_axes + of_rest) - np.log(np.diag(lower)).sum())
 
 
 def _root(covariance: FloatArray) -> FloatArray:
