@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterable, Iterator
 from toolpath_stiff.nc.codes.motion import record_strokes
 from toolpath_stiff.nc.geometry import PLANES
 from toolpath_stiff.nc.heidenhain.contour import check_known, direction, go
+from toolpath_stiff.nc.heidenhain.contour_cycles import CYCLES, mill_contours
 from toolpath_stiff.nc.heidenhain.milling import AUTO, MAX, MILLED, mill_form
 from toolpath_stiff.nc.heidenhain.points import feed, inch_tenths, named, outside_contour, present
 from toolpath_stiff.nc.moves import CYCLE, RAPID
@@ -117,6 +118,10 @@ def call(state: State, block: CurrentBlock, change: Values | None = None) -> Non
     if plain.cycle is None:
         raise block.fail(None, "calls a cycle, and none is defined", "CYCL DEF before it")
     outside_contour(state, block, "calls a cycle")
+    if plain.cycle[0] in CYCLES:
+        block.refuse_if(change, None, "calls a cycle of contours at a point", "CYCL CALL or M99")
+        mill_contours(state, block, *plain.cycle)
+        return
     unit, (number, values), change = state.length_scale, plain.cycle, change or {}
     if "Q203" in values:
         kept = (name for name, value in values.items() if plain.parameters.get(name, value) != value)

@@ -11,6 +11,7 @@ from toolpath_stiff.nc.codes.code import Code, Rows, holds_anyway, refused, tabl
 from toolpath_stiff.nc.codes.registry import code_meaning
 from toolpath_stiff.nc.heidenhain import approach, contour, coordinates, cycles, free_contour, functions, tools
 from toolpath_stiff.nc.heidenhain.contour import MANUAL, PATHS, POLAR
+from toolpath_stiff.nc.heidenhain.contour_cycles import define as define_contours
 
 CONTROLS = ("heidenhain",)
 _CYCLES = "HEIDENHAIN, user's manual Cycles of the iTNC 530"
@@ -98,6 +99,12 @@ _ROWS: Rows = (
         ("CYCL DEF 251|CYCL DEF 252|CYCL DEF 253|CYCL DEF 256|CYCL DEF 257", cycles.define,
          "rectangular, circular pocket; slot; rectangular, circular stud"),
         (f"{_parts(4, 0, 6)}|{_parts(5, 0, 5)}", cycles.define_older, "pockets, of older controls"),
+    )),
+    ("motion", f"{_CYCLES}, Fixed cycles: contour pocket, contour trains", (
+        ("CYCL DEF 14.0|CYCL DEF 14.1", _SILENT, "labels of contours"),
+        ("CYCL DEF 20", define_contours, "what cycles 22 to 24 share"),
+        ("CYCL DEF 22|CYCL DEF 23|CYCL DEF 24|CYCL DEF 25", define_contours,
+         "contour pockets: rough-out, floor, side finishing; contour train"),
     )),
     ("motion", _PATTERNS, (
         ("CYCL DEF 220|CYCL DEF 221", cycles.define, "the cycle on a circle, on lines"),
