@@ -180,7 +180,7 @@ def _outlines(area: "Polygon", turn: int) -> Iterator[Contour]:
     import shapely
     from shapely.geometry.polygon import orient
 
-    for part in shapely.get_parts(area):
+    for part in shapely.get_parts(area) if not area.is_empty else ():
         shape = orient(part, turn)
         for ring in (shape.exterior, *shape.interiors):
             yield [(complex(*a), complex(*b), None, 0) for a, b in pairwise(ring.coords)]

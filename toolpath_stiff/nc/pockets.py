@@ -158,8 +158,8 @@ def along(
         yield start, floor, down, None, 0
         if free and size:
             yield path[0][0], floor, feed, into, free
-        for _, place, center, turn in path:
-            yield place, floor, feed, center, turn
+        for _, to, about, turn in path:
+            yield to, floor, feed, about, turn
         if free and size:
             yield end, floor, feed, out, free
         yield end, safe, None, None, 0

@@ -21,7 +21,7 @@ from toolpath_stiff.nc.contour_pockets import (
 )
 from toolpath_stiff.nc.geometry import PLANES
 from toolpath_stiff.nc.heidenhain.contour import mill, tool_radius
-from toolpath_stiff.nc.heidenhain.milling import AUTO, MAX, MOST_ROUNDS, Values, floors_of, note_inside
+from toolpath_stiff.nc.heidenhain.milling import AUTO, BESIDE_MM, MAX, MOST_ROUNDS, Values, floors_of, note_inside
 from toolpath_stiff.nc.heidenhain.points import in_plane, inch_tenths, present
 from toolpath_stiff.nc.pockets import Cut, along
 from toolpath_stiff.nc.state import CurrentBlock, State
@@ -103,6 +103,7 @@ def _cuts(
         for way in (1, -1)
     )
     block.refuse_if(len(pockets + islands) < len(contours), None, "mills a pocket that is not closed", "its end")
+    block.refuse_if(not pockets, None, "mills islands without a pocket around them", "the pocket's label, its side")
     turn, area = 1 if v["Q9"] >= 0.0 else -1, area_of(pockets, islands)
     apart = radius + v["Q14" if number == SIDE else "Q3"]
     walls, room = walls_of(area, pockets, islands, apart, turn, v["Q8"]), area.buffer(-apart)
@@ -123,9 +124,10 @@ def _train(
     block.refuse_if(not side and v["Q15"] <= 0.0, None, "chooses the direction of a contour without a side", "Q15=+1")
     if side and side != way:  # climb milling has the tool to the left of its path
         contour, side = backward(contour), -side
-    apart, above = radius + v["Q3"], v["Q7"]
+    apart, above = radius + v["Q3"], v["Q5"]
     for floor in floors_of(v["Q5"], v["Q5"] + v["Q1"], abs(v["Q10"])):
         path = path_beside(contour, side * apart) if side else contour
-        yield from along(path, side, ([floor], above, v["Q7"] - above), feeds, radius)
+        yield from along(path, side, ([floor], v["Q7"], BESIDE_MM), feeds, radius, top=above)
+        above = floor
         if not v["Q15"]:
             contour, side = backward(contour), -side
