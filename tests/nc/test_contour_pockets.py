@@ -8,14 +8,22 @@ import pytest
 
 from tests.nc.test_heidenhain import read
 from toolpath_stiff.errors import ProgramError
-from toolpath_stiff.nc.contour_pockets import backward, path_beside
+from toolpath_stiff.nc.drawing import backward, path_beside
+from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.geometry import ArcError
+from toolpath_stiff.nc.state import CurrentBlock, State
+from toolpath_stiff.nc.tables import Offsets
+from toolpath_stiff.nc.words import Block, Word
 
 HEAD = (
     "CYCL DEF 14.0 K\nCYCL DEF 14.1 LABEL 1 /2\nCYCL DEF 20 D Q1=-6 Q2={step} Q3={spare} Q4=0 Q5=0 Q6=2 Q7=9"
     " Q8=0 Q9={way}\nCYCL DEF {cycle} C Q9={way} Q10=4 Q11=100 Q12=300 Q14={spare}\nL Z+9 FMAX M3\nCYCL CALL\nM30\n"
 )
 ROUND_ISLAND = "LBL 2\nCC X{x:+} Y{y:+}\nL X{e:+} Y{y:+} RR\nC X{e:+} Y{y:+} DR+\nLBL 0"
+
+
+STATE = State("t.h", frames=Frames(Offsets(), None, (0.0,) * 6))
+BLOCK = CurrentBlock("t.h", Block(1, (Word("", 0.0, 1, "CYCL CALL"),)))
 
 
 def dense(moves, rows) -> np.ndarray:
@@ -114,13 +122,13 @@ def test_a_path_beside_lines_and_arcs_stays_at_its_distance(seed):
         end = center + (there - center) * cmath.exp(1j * turned)
         chain.append((there, end, center, turn))
         here, heading = end, heading * cmath.exp(1j * turned)
-    path = path_beside(chain, left)
+    path = path_beside(STATE, BLOCK, chain, left)
     for (start, end, center, turn), (a, b, c, way) in zip(chain, path, strict=True):
         assert (c, way) == (center, turn)
         assert abs(a - start) == pytest.approx(3.0) and abs(b - end) == pytest.approx(3.0)
         if c is not None:
             assert abs(a - c) == pytest.approx(8.0 - turn * left)
-    mirrored = path_beside(backward(chain), -left)
+    mirrored = path_beside(STATE, BLOCK, backward(chain), -left)
     assert [(b, a) for a, b, _, _ in reversed(mirrored)] == [
         (pytest.approx(a), pytest.approx(b)) for a, b, _, _ in path
     ]
@@ -129,11 +137,13 @@ def test_a_path_beside_lines_and_arcs_stays_at_its_distance(seed):
 def test_what_does_not_fit_is_refused():
     with pytest.raises(ArcError, match="gouging"):
         path_beside(
+            STATE,
+            BLOCK,
             [(0j, 9 + 0j, None, 0), (9 + 0j, 9 + 1j, None, 0), (9 + 1j, 18 + 1j, None, 0), (18 + 1j, 18 - 9j, None, 0)],
             -2.0,
         )
     with pytest.raises(ArcError, match="turns back"):
-        path_beside([(0j, 9 + 0j, None, 0), (9 + 0j, 0j + 1, None, 0)], 2.0)
+        path_beside(STATE, BLOCK, [(0j, 9 + 0j, None, 0), (9 + 0j, 0j + 1, None, 0)], 2.0)
     square = [0j, 30 + 0j, 30 + 30j, 30j]
     with pytest.raises(ProgramError, match="narrower than its tool"):
         read(program(22, 1, 1, 0, [place / 4.0 for place in square], "").replace("1 /2", "1"))

@@ -12,7 +12,7 @@ from pathlib import PurePath
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes.code import Code
-from toolpath_stiff.nc.contour_pockets import drawing, elements_of
+from toolpath_stiff.nc.drawing import drawing, elements_of
 from toolpath_stiff.nc.elements import Element
 from toolpath_stiff.nc.heidenhain.contour import SIDES
 from toolpath_stiff.nc.heidenhain.cycles import call, pattern
@@ -35,9 +35,9 @@ from toolpath_stiff.nc.words import Block, Word
 
 CALLED = re.compile(r'\s*(?:(\d+|Q[LR]?\d+)|"([^"]*)")\s*(REP\s*(\d+|Q[LR]?\d+)?\s*(?:/\s*\d+)?)?\s*$')
 END_OF_LABEL = re.compile(r"\s*0+\s*")
-DRAWS = ("L", "LP", "CC", "C", "CP", "CR", "CT", "CTP", "RND", "CHF", "FPOL", *FREE, "M", "CALL LBL", "LBL")
 CONTOUR = frozenset(("RND", "CHF", "L", "LP", "C", "CP", "CR", "CT", "CTP", "LN", *FREE))
 FORMULAS = ("FN0", "FN1", "FN2", "FN3", "FN4", "FN5", "FN6", "FN7", "FN8", "FN13")
+DRAWS = CONTOUR | {"CC", "FPOL", "M", "LBL", "CALL LBL", *FORMULAS, *CONDITIONS}
 OF_CONTROL = ("FN18", "FN28")
 TO_MACHINE = ("M91", "M92")  # with these FMAX may lead to an unknown point
 TILTING = ("Q120", "Q121", "Q122")  # positions of A, B, C that the control computes for a tilted plane
@@ -247,24 +247,26 @@ class HeidenhainRun(ProgramRun):
         """The contour of a label, with the side of its compensation, drawn beside the run."""
         state, base, side, row = self.state, len(self._levels), 0, self._label(self._at, f"{label:g}", None) + 1
         self.state = drawn = drawing(state)
-        drawn.plain.parameters, drawn.plain.radius = state.plain.parameters, state.plain.radius
+        drawn.plain.parameters, drawn.plain.radius, drawn.plain.tool_feed = (
+            state.plain.parameters,
+            state.plain.radius,
+            1.0,
+        )
         try:
-            while True:
+            while (
+                (statement := self._statement(row)).head != "LBL"
+                or len(self._levels) > base
+                or not END_OF_LABEL.fullmatch(statement.rest)
+            ):
                 self._count_block(row)
-                statement = self._statement(row)
-                if statement.head == "LBL" and len(self._levels) == base and END_OF_LABEL.fullmatch(statement.rest):
-                    break
-                allowed = statement.head in (*DRAWS, *FORMULAS, *CONDITIONS, "") or statement.head[0] == "Q"
-                if not allowed:
+                if statement.head and statement.head not in DRAWS and statement.head[0] != "Q":
                     raise self._fail(
                         row, f"{statement.head} in a contour of cycle 14", "contour elements, Q parameters"
                     )
-                sides = [SIDES[word.letter] for word in statement.words if word.letter in SIDES]
-                side = sides[0] if sides else side
+                side = next((SIDES[word.letter] for word in statement.words if word.letter in SIDES), side)
                 words = tuple(w._replace(letter="R0") if w.letter in SIDES else w for w in statement.words)
                 row = self._acted(row, replace(statement, words=words)) if statement.head else statement.after
-            if drawn.plain.held or drawn.plain.free:
-                raise self._fail(row, "the contour ends before the element behind a corner, or not determined", "it")
+            self._end(row, "the contour")
             return elements_of(drawn, block, "a cycle"), side
         finally:
             self.state = state

@@ -11,7 +11,6 @@ from toolpath_stiff.nc.codes.code import Code, Rows, holds_anyway, refused, tabl
 from toolpath_stiff.nc.codes.registry import code_meaning
 from toolpath_stiff.nc.heidenhain import approach, contour, coordinates, cycles, free_contour, functions, tools
 from toolpath_stiff.nc.heidenhain.contour import MANUAL, PATHS, POLAR
-from toolpath_stiff.nc.heidenhain.contour_cycles import define as define_contours
 
 CONTROLS = ("heidenhain",)
 _CYCLES = "HEIDENHAIN, user's manual Cycles of the iTNC 530"
@@ -102,9 +101,8 @@ _ROWS: Rows = (
     )),
     ("motion", f"{_CYCLES}, Fixed cycles: contour pocket, contour trains", (
         ("CYCL DEF 14.0|CYCL DEF 14.1", _SILENT, "labels of contours"),
-        ("CYCL DEF 20", define_contours, "what cycles 22 to 24 share"),
-        ("CYCL DEF 22|CYCL DEF 23|CYCL DEF 24|CYCL DEF 25", define_contours,
-         "contour pockets: rough-out, floor, side finishing; contour train"),
+        ("CYCL DEF 20|CYCL DEF 22|CYCL DEF 23|CYCL DEF 24|CYCL DEF 25", cycles.define,
+         "contour pockets: shared data, rough-out, floor and side finishing; contour train"),
     )),
     ("motion", _PATTERNS, (
         ("CYCL DEF 220|CYCL DEF 221", cycles.define, "the cycle on a circle, on lines"),

@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 
 from toolpath_stiff.nc.codes.code import code_name
-from toolpath_stiff.nc.contour_pockets import drawing, elements_of
+from toolpath_stiff.nc.drawing import drawing, elements_of
 from toolpath_stiff.nc.elements import Element
 from toolpath_stiff.nc.run_records import Tally
 from toolpath_stiff.nc.siemens.cycles import repeated
