@@ -107,6 +107,8 @@ def test_rough_out_leaves_nothing_that_the_tool_can_reach_and_cuts_nothing_else(
     reached = grid[in_room & (np.minimum(room, abs(grid - complex(x, y)) - size) > reach)]  # by the tool's centre
     left = [abs(points - place).min() for place in reached]
     assert max(left) <= 5.0 + 0.02
+    moved = abs(moves.end[:, :2] - moves.start[:, :2]).max(axis=1) > 1e-9
+    assert moves.end[moved & (moves.motion == 0), 2].min() == moves.start[moved & (moves.motion == 0), 2].min() == 9e-3
 
 
 @pytest.mark.parametrize("seed", range(8))

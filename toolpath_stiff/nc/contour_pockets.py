@@ -102,12 +102,15 @@ def clear_area(
     stays = [way.covers(_line((before[-1][1], after[0][0]))) for before, after in pairwise(course)]
     (floors, safe, ahead), (feed, down), above = heights, feeds, top
     for floor in floors:
+        here: complex | None = None
         for ring, follows in zip(course, [False, *stays], strict=True):
-            for height, rate in (
-                ((floor, feed),) if follows else ((safe, None), (min(above + ahead, safe), None), (floor, down))
-            ):
-                yield ring[0][0], height, rate, None, 0
+            start = ring[0][0]
+            lifted = [(start if here is None else here, safe, None), (start, safe, None)]
+            down_to = [(start, min(above + ahead, safe), None), (start, floor, down)]
+            for place, height, rate in [(start, floor, feed)] if follows else [*lifted, *down_to]:
+                yield place, height, rate, None, 0
             for _, place, center, way_round in ring:
                 yield place, floor, feed, center, way_round
+            here = ring[-1][1]
         yield course[-1][-1][1], safe, None, None, 0
         above = floor
