@@ -111,6 +111,30 @@ def test_rough_out_leaves_nothing_that_the_tool_can_reach_and_cuts_nothing_else(
     assert moves.end[moved & (moves.motion == 0), 2].min() == moves.start[moved & (moves.motion == 0), 2].min() == 9e-3
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_smaller_tool_mills_just_what_a_larger_one_has_left(seed):
+    chance = np.random.default_rng(200 + seed)
+    polygon, spare = corners(chance), (0.0, 0.5)[seed % 2]
+    text = program(22, 1, 0.8, spare, polygon).replace("1 /2", "1")
+    cycle = next(line for line in text.splitlines() if line.startswith("CYCL DEF 22"))
+    moves = read(text.replace("M30\n", f"TOOL CALL 2 Z S1000\nL Z+9 FMAX M3\n{cycle} Q18=1\nCYCL CALL\nM30\n", 1)).moves
+    cuts = [row for row in range(len(moves)) if moves.motion[row] and moves.end[row, 2] == moves.start[row, 2] == -6e-3]
+    coarse, fine = (dense(moves, [row for row in cuts if moves.tool[row] == tool]) for tool in (1, 2))
+    near, within = to_polygon(fine, polygon)
+    assert within.all() and near.min() > 2.0 + spare - 0.011
+    around = zip(polygon, [*polygon[1:], polygon[0]], [*polygon[2:], *polygon[:2]], strict=True)
+    sharpest = min(around, key=lambda three: abs(math.pi - cmath.phase((three[2] - three[1]) / (three[1] - three[0]))))[
+        1
+    ]
+    grid = sharpest + (np.linspace(-6.0, 6.0, 49) + 1j * np.linspace(-6.0, 6.0, 49)[:, None]).ravel()
+    room, in_room = to_polygon(grid, polygon)
+    inside, reached = grid[in_room & (room > spare)], grid[in_room & (room > 2.0 + spare)]
+    left = [place for place in inside if abs(coarse - place).min() > 5.02]
+    left = [place for place in left if abs(reached - place).min() < 1.9]
+    assert left and max(abs(fine - place).min() for place in left) <= 2.0 + 0.02
+    assert max(abs(np.array(polygon) - place).min() for place in fine) < 9.0  # nothing away from the corners
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_a_path_beside_lines_and_arcs_stays_at_its_distance(seed):
     """Chains of lines and tangent arcs: every point of the path is at its distance from the chain, to its left."""

@@ -187,7 +187,7 @@ REFUSALS = {
     f"{POCKET.format(252, 'Q223=40 Q370=-1')}\nM99": ("no overlap", 4),
     f"{POCKET.format(252, 'Q223=40').replace('Q202=4', 'Q202=0.0001')}\nM99": ("too many rounds", 4),
     f"{POCKET.format(252, 'Q223=40').replace('Q207=300', 'Q207=MAX')}\nM99": ("mills at FMAX", 4),
-    f"{SL.replace('Q18=0', 'Q18=3')}\nM30\n{SQUARE}": ("mills what another tool has left", 7),
+    f"{SL.replace('Q18=0', 'Q18=3')}\nM30\n{SQUARE}": ("Q18 names a tool of unknown radius", 7),
     f"{SL.replace('Q1=-4', 'Q1=4')}\nM30\n{SQUARE}": ("is not below the surface", 7),
     f"{SL.replace('Q7=9', 'Q7=1')}\nM30\n{SQUARE}": ("is below the surface and its clearance", 7),
     f"{SL.replace('Q10=2', 'Q10=0.0001')}\nM30\n{SQUARE}": ("too many infeeds", 7),

@@ -53,6 +53,15 @@ def area_of(pockets: list[Contour], islands: list[Contour]) -> shapely.Polygon:
     return area.difference(shapely.union_all(inner))
 
 
+def left_by(area: shapely.Polygon, coarse: float, radius: float, spare: float) -> shapely.Polygon:
+    """The area for a tool that mills, up to an allowance, what one of the radius `coarse` could not reach in it."""
+    rough = area.buffer(-spare, QUARTER)
+    left = rough.difference(rough.buffer(-coarse, QUARTER).buffer(coarse + NEAR_MM, QUARTER))
+    return (
+        area.buffer(-spare - radius, QUARTER).intersection(left.buffer(radius, QUARTER)).buffer(spare + radius, QUARTER)
+    )
+
+
 def walls_within(area: shapely.Polygon, walls: list[Contour], apart: float, turn: int) -> list[Contour]:
     """Paths beside the edges of an area if the tool fits along all of them, else round what it can reach."""
     room = area.buffer(NEAR_MM - apart, QUARTER)

@@ -6,6 +6,7 @@ infeeds, feeds and directions are the cycles'; rings that clear the inside, and 
 (`contour_pockets`).
 """
 
+import math
 from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import suppress
@@ -19,6 +20,7 @@ from toolpath_stiff.nc.heidenhain.milling import AUTO, BESIDE_MM, MAX, MOST_ROUN
 from toolpath_stiff.nc.heidenhain.points import in_plane, inch_tenths, present
 from toolpath_stiff.nc.pockets import Cut, Feeds, along
 from toolpath_stiff.nc.state import CurrentBlock, State
+from toolpath_stiff.nc.tables import tool_of
 
 Contours = list[tuple[Contour, int]]  # with +1 of RL, -1 of RR, 0
 ROUGH, FLOOR, SIDE, TRAIN = 22, 23, 24, 25
@@ -33,12 +35,18 @@ def mill_contours(state: State, block: CurrentBlock, number: int, own: Values) -
     changed = next((name for name, value in v.items() if plain.parameters.get(name, value) != value), None)
     block.refuse_if(changed, None, f"after {changed} was set again behind the cycle", "its value in CYCL DEF")
     block.refuse_if("Q5" not in v or not plain.labels, None, "calls a cycle of contours", "cycles 14 and 20 before it")
+    coarse = tool_of(state.tools, int(v["Q18"])).diameter / 2.0 / plain.scale
     for name, wrong, problem, expected in (
         ("Q1", v["Q1"] >= 0.0, "is not below the surface", "a negative depth"),
         ("Q2", number in (ROUGH, FLOOR) and not 0.1 <= v["Q2"] < 2.0, "is no overlap", "0.1 to 1.999"),
         ("Q7", v["Q7"] < v["Q5"] + v["Q6"], "is below the surface and its clearance", "a safe height"),
         ("Q12", v["Q12"] == MAX, "mills at FMAX", "a feed"),
-        ("Q18", v["Q18"] > 0.0, "mills what another tool has left, which the control finds out", "0"),
+        (
+            "Q18",
+            v["Q18"] and math.isnan(coarse),
+            "names a tool of unknown radius",
+            "it in the tool table (--tools FILE)",
+        ),
         ("Q10", v["Q1"] < -MOST_ROUNDS * abs(v["Q10"] or v["Q1"]), "makes too many infeeds", "a larger one"),
         ("M4 or cycle 8", state.turn < 0 or plain.mirrored, "decides where climb milling goes", "M3"),
     ):
@@ -54,7 +62,7 @@ def mill_contours(state: State, block: CurrentBlock, number: int, own: Values) -
         labels = plain.labels[:1] if number == TRAIN else plain.labels
         contours = [plain.drawn(block, label) for label in labels]
         way = _train if number == TRAIN else _pocket
-        cuts = list(way(state, block, number, v | {"R": radius}, (feed or 0.0, down), contours))
+        cuts = list(way(state, block, number, v | {"R": radius, "coarse": coarse}, (feed or 0.0, down), contours))
     (*_, normal), here = PLANES[state.plane], present(state)
     above = [(place, max(here[normal], v["Q7"]), None, None, 0) for place in (in_plane(state, here), cuts[0][0])]
     mill(state, block, [*above, *cuts])
@@ -78,8 +86,12 @@ def _pocket(
             walls.append(path_beside(state, block, directed, turn * apart, v["Q8"]))
     block.refuse_if(not pockets, None, "mills islands without a pocket around them", "the pocket's label, its side")
     area, all_fit = areas.area_of(pockets, islands), len(walls) == len(contours)
+    if number == ROUGH and v["Q18"]:  # what that tool has left, as far as this one reaches
+        area, all_fit = areas.left_by(area, v["coarse"], v["R"], v["Q3"]), False
     walls, room = areas.walls_within(area, walls if all_fit else [], apart, turn), area.buffer(-apart)
-    block.refuse_if(not walls, None, "mills a pocket narrower than its tool", "a smaller tool")
+    block.refuse_if(
+        not walls, None, "mills a pocket narrower than its tool, or what no tool has left", "a smaller tool"
+    )
     bottom = v["Q5"] + v["Q1"]
     floors = [bottom] if number == FLOOR else floors_of(v["Q5"], bottom + v["Q4"] * (number == ROUGH), abs(v["Q10"]))
     heights = floors, v["Q7"], v["Q6"]

@@ -33,7 +33,7 @@ from toolpath_stiff.nc.run_records import Subprogram, Tally, beyond_the_end
 from toolpath_stiff.nc.state import CurrentBlock, Flow
 from toolpath_stiff.nc.words import Block, Word
 
-CALLED = re.compile(r'\s*(?:(\d+|Q[LR]?\d+)|"([^"]*)")\s*(REP\s*(\d+|Q[LR]?\d+)?\s*(?:/\s*\d+)?)?\s*$')
+CALLED = re.compile(r'\s*(?:(\d+|Q[LR]?\d+)|"([^"]*)")\s*(REP\s*(\d+|Q[LR]?\d+)?\s*(?:/\s*(?:\d+|Q[LR]?\d+))?)?\s*$')
 END_OF_LABEL = re.compile(r"\s*0+\s*")
 CONTOUR = frozenset(("RND", "CHF", "L", "LP", "C", "CP", "CR", "CT", "CTP", "LN", *FREE))
 FORMULAS = ("FN0", "FN1", "FN2", "FN3", "FN4", "FN5", "FN6", "FN7", "FN8", "FN13")
