@@ -67,7 +67,7 @@ def walls_within(area: shapely.Polygon, walls: list[Contour], apart: float, turn
     room = area.buffer(NEAR_MM - apart, QUARTER)
     if walls and all(room.covers(line_along(wall)) for wall in walls):
         return walls
-    fine = math.ceil(math.pi / 4.0 / math.acos(1.0 - min(FLAT_MM / apart, 1.0)))
+    fine = math.ceil(math.pi / 4.0 / math.acos(1.0 - FLAT_MM / max(apart, FLAT_MM)))
     return list(_edges(area.buffer(-apart, fine), turn))
 
 

@@ -29,9 +29,8 @@ ROUGH, FLOOR, SIDE, TRAIN = 22, 23, 24, 25
 def mill_contours(state: State, block: CurrentBlock, number: int, own: Values) -> None:
     """Carry out cycle 22, 23, 24 or 25 on the contours of cycle 14; in mm."""
     plain, unit = state.plain, state.length_scale
-    radius, v = tool_radius(state, block, None) / plain.scale, defaultdict(float, own)
-    if number != TRAIN:
-        v = defaultdict(float, plain.contour_data | own)
+    radius = tool_radius(state, block, None) / plain.scale
+    v = defaultdict(float, own if number == TRAIN else plain.contour_data | own)
     changed = next((name for name, value in v.items() if plain.parameters.get(name, value) != value), None)
     block.refuse_if(changed, None, f"after {changed} was set again behind the cycle", "its value in CYCL DEF")
     block.refuse_if("Q5" not in v or not plain.labels, None, "calls a cycle of contours", "cycles 14 and 20 before it")
@@ -41,12 +40,7 @@ def mill_contours(state: State, block: CurrentBlock, number: int, own: Values) -
         ("Q2", number in (ROUGH, FLOOR) and not 0.1 <= v["Q2"] < 2.0, "is no overlap", "0.1 to 1.999"),
         ("Q7", v["Q7"] < v["Q5"] + v["Q6"], "is below the surface and its clearance", "a safe height"),
         ("Q12", v["Q12"] == MAX, "mills at FMAX", "a feed"),
-        (
-            "Q18",
-            v["Q18"] and math.isnan(coarse),
-            "names a tool of unknown radius",
-            "it in the tool table (--tools FILE)",
-        ),
+        ("Q18", v["Q18"] and math.isnan(coarse), "names a tool of unknown radius", "it in a tool table (--tools FILE)"),
         ("Q10", v["Q1"] < -MOST_ROUNDS * abs(v["Q10"] or v["Q1"]), "makes too many infeeds", "a larger one"),
         ("M4 or cycle 8", state.turn < 0 or plain.mirrored, "decides where climb milling goes", "M3"),
     ):
@@ -59,27 +53,22 @@ def mill_contours(state: State, block: CurrentBlock, number: int, own: Values) -
     v |= {name: v[name] * unit for name in ("Q1", "Q3", "Q4", "Q5", "Q6", "Q7", "Q8", "Q10", "Q14")}
     with block.placing():
         assert plain.drawn is not None
-        labels = plain.labels[:1] if number == TRAIN else plain.labels
-        contours = [plain.drawn(block, label) for label in labels]
-        way = _train if number == TRAIN else _pocket
-        cuts = list(way(state, block, number, v | {"R": radius, "coarse": coarse}, (feed or 0.0, down), contours))
+        contours = [plain.drawn(block, label) for label in (plain.labels[:1] if number == TRAIN else plain.labels)]
+        v |= {"R": radius, "coarse": coarse, "cycle": number}
+        cuts = list((_train if number == TRAIN else _pocket)(state, block, v, (feed or 0.0, down), contours))
     (*_, normal), here = PLANES[state.plane], present(state)
     above = [(place, max(here[normal], v["Q7"]), None, None, 0) for place in (in_plane(state, here), cuts[0][0])]
     mill(state, block, [*above, *cuts])
     plain.unknown |= {*PLANES[state.plane][:2]}  # a machine parameter says whether the tool goes back to where it was
 
 
-def _pocket(
-    state: State, block: CurrentBlock, number: int, v: Values, feeds: Feeds, contours: Contours
-) -> Iterator[Cut]:
+def _pocket(state: State, block: CurrentBlock, v: Values, feeds: Feeds, contours: Contours) -> Iterator[Cut]:
     """Pockets and islands: RL and RR say on which side of its contour the tool is."""
     pockets, islands, walls = list[Contour](), list[Contour](), list[Contour]()
-    turn, apart = 1 if v["Q9"] >= 0.0 else -1, v["R"] + v["Q14" if number == SIDE else "Q3"]
+    number, turn, apart = v["cycle"], 1 if v["Q9"] >= 0.0 else -1, v["R"] + v["Q14" if v["cycle"] == SIDE else "Q3"]
     for contour, side in contours:
-        open_ = not side or not is_closed(contour)
-        block.refuse_if(
-            open_, None, "mills a contour that is open, or has no side", "RL or RR, and its end at its start"
-        )
+        wrong = not side or not is_closed(contour)
+        block.refuse_if(wrong, None, "mills a contour that is open, or has no side", "RL or RR, its end at its start")
         (pockets if side * areas.orientation(contour) > 0 else islands).append(contour)
         with suppress(ArcError):  # climb milling has the tool to the left of its path
             directed = contour if side == turn else backward(contour)
@@ -89,9 +78,7 @@ def _pocket(
     if number == ROUGH and v["Q18"]:  # what that tool has left, as far as this one reaches
         area, all_fit = areas.left_by(area, v["coarse"], v["R"], v["Q3"]), False
     walls, room = areas.walls_within(area, walls if all_fit else [], apart, turn), area.buffer(-apart)
-    block.refuse_if(
-        not walls, None, "mills a pocket narrower than its tool, or what no tool has left", "a smaller tool"
-    )
+    block.refuse_if(not walls, None, "mills a pocket narrower than its tool, or nothing left", "a smaller tool")
     bottom = v["Q5"] + v["Q1"]
     floors = [bottom] if number == FLOOR else floors_of(v["Q5"], bottom + v["Q4"] * (number == ROUGH), abs(v["Q10"]))
     heights = floors, v["Q7"], v["Q6"]
@@ -101,9 +88,7 @@ def _pocket(
         yield from along(wall, turn, heights, feeds, areas.lead_within(room, wall, turn, v["R"]), top=v["Q5"])
 
 
-def _train(
-    state: State, block: CurrentBlock, number: int, v: Values, feeds: Feeds, contours: Contours
-) -> Iterator[Cut]:
+def _train(state: State, block: CurrentBlock, v: Values, feeds: Feeds, contours: Contours) -> Iterator[Cut]:
     """Along one contour, open or closed: in the direction of Q15 (0: to and fro); leads on quarters of a circle."""
     (contour, side), way = contours[0], v["Q15"]
     block.refuse_if(not side and way <= 0.0, None, "chooses the direction of a contour without a side", "Q15=+1")
