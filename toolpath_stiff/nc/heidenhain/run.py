@@ -125,7 +125,9 @@ class HeidenhainRun(ProgramRun):
         unused = next((letter for letter in block.values if letter in block.free), None)
         if unused is not None and not head.startswith("APPR") and not plain.free and head not in FREE:
             raise block.fail(unused, f"is no word of {head}", "its own words")
-        positioned = head in ("L", "LP") and (len(self.state.recorder) > before or bool(block.values.keys() & {*"XYZ"}))
+        positioned = head in ("L", "LP") and (
+            len(self.state.recorder) > before or bool(block.values.keys() & {*"XYZ", "IX", "IY", "IZ"})
+        )
         if once is not None or ((modal is not None or plain.modal) and positioned):
             call(self.state, block)
         plain.modal = (plain.modal or modal is not None) and once is None
