@@ -28,7 +28,7 @@ def cuts(moves: Moves) -> list[np.ndarray]:
 
 def floors_wrong(moves: Moves, top: float, bottom: float, infeed: float) -> str:
     """Heights of level cuts against infeeds from the top, the last one shorter."""
-    heights, expected, height = {round(level[0, 2], 6) for level in cuts(moves)}, set(), top
+    heights, expected, height = {round(level[0, 2], 6) for level in cuts(moves) if level[0, 2] < top}, set(), top
     while height - infeed > bottom + 1e-9 and infeed > 0.0:
         height -= infeed
         expected.add(round(height, 6))
