@@ -92,7 +92,7 @@ def test_random_programs_are_read_as_the_independent_reader_reads_them(first):
 
 
 def test_a_reading_that_errs_is_found_out():
-    text = random_program(7)
+    text = random_program(8)
     assert not heidenhain.difference(text)
     for right, wrong in (("DR+", "DR-"), (" FMAX", " F20"), ("+ 0", "+ 0")):
         wronged = text.replace(right, wrong, 1)
