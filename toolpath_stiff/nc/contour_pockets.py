@@ -11,8 +11,7 @@ from itertools import pairwise
 import shapely
 from shapely.geometry.polygon import orient
 
-from toolpath_stiff.nc.drawing import Contour, swept
-from toolpath_stiff.nc.elements import Element, direction
+from toolpath_stiff.nc.elements import Contour, Element, direction, swept
 from toolpath_stiff.nc.geometry import refuse_arc_if
 from toolpath_stiff.nc.pockets import MOST_LAYERS, Cut, Feeds, Heights
 

@@ -8,15 +8,14 @@ import math
 from contextlib import suppress
 
 from toolpath_stiff.nc.compensation import RadiusCompensation
-from toolpath_stiff.nc.elements import Element, cut_off
+from toolpath_stiff.nc.elements import Contour, cut_off, swept
 from toolpath_stiff.nc.frames import Frames
-from toolpath_stiff.nc.geometry import PLANES, ArcError, turn_between
+from toolpath_stiff.nc.geometry import PLANES, ArcError
 from toolpath_stiff.nc.heidenhain.contour import mill
 from toolpath_stiff.nc.pockets import LEAST_MM
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.tables import Offsets
 
-Contour = list[Element]
 CLOSED_MM = 0.016  # between start and end: as far as an arc's end may lie off its circle
 
 
@@ -50,12 +49,6 @@ def elements_of(drawn: State, block: CurrentBlock, what: str) -> Contour:
     arc = not contour or trace[0].arc is not None
     block.refuse_if(arc, None, f"{what} along no contour", "a straight move to its start, and its elements")
     return contour
-
-
-def swept(element: Element) -> float:
-    """Signed angle of an arc; 0 of a line."""
-    start, end, center, turn = element
-    return turn_between(cmath.phase(start - center), cmath.phase(end - center), turn < 0) if center is not None else 0.0
 
 
 def is_closed(contour: Contour) -> bool:
