@@ -40,17 +40,42 @@ def seen(moves: Moves) -> list[tuple[str, np.ndarray, np.ndarray]]:
     return rows
 
 
+def milled(moves: list, lines: np.ndarray, witness: list) -> list:
+    """Moves with those of each milling cycle (the witness's "M") as one: ("M", what is wrong)."""
+    merged, row = [], 0
+    for kind, line, claim in witness:
+        last = row + 1
+        if kind == "M":
+            last = next((i for i in range(row, len(moves)) if lines[i] != line), len(moves))
+            check, frame, end = claim
+            to_program = np.linalg.inv(frame)
+            local = [(k, (np.c_[p, np.ones(len(p))] @ to_program.T)[:, :3]) for k, p, _ in moves[row:last]]
+            off = end is not None and np.abs(local[-1][1][-1] - end).max() > TOLERANCE_MM
+            merged.append(("M", "another end" if off else check(local)))
+        else:
+            merged += moves[row:last]
+        row = last
+    return merged + moves[row:]
+
+
 def difference(text: str, language: str = "heidenhain") -> str:
     """What differs between both readings, or why one refuses; "" where they agree."""
     readers, name = READERS[language]
     witness = readers.Reader(text).moves
     try:
-        moves = seen(parse_program(text, name).moves)
+        read = parse_program(text, name).moves
+        moves, lines = seen(read), read.line
     except TpsError as error:
         return f"refused: {error}"
+    moves = milled(moves, lines, witness)
     for number, (ours, theirs) in enumerate(zip(moves, witness, strict=False)):
-        apart, leaning = np.abs(ours[1] - theirs[1]).max(), np.abs(ours[2] - theirs[2]).max()
-        if ours[0] != theirs[0] or apart > TOLERANCE_MM or leaning > TOLERANCE_AXIS:
+        if theirs[0] == "M":  # what a milling cycle says of its path
+            if problem := ours[1]:
+                return f"move {number}: {problem}"
+            continue
+        kind, known = ("R", -1) if theirs[0] == "E" else (theirs[0], 0)  # only its end, where it begins is not said
+        apart, leaning = np.abs(ours[1][known:] - theirs[1][known:]).max(), np.abs(ours[2] - theirs[2]).max()
+        if ours[0] != kind or apart > TOLERANCE_MM or leaning > TOLERANCE_AXIS:
             return f"move {number}: {ours} and {theirs}"
     return "" if len(moves) == len(witness) else f"{len(moves)} moves and {len(witness)}"
 

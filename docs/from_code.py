@@ -80,8 +80,11 @@ def codes_table() -> str:
 # Statements of Heidenhain's language in random programs that an independent reader reads too; the test looks them up.
 HUNTED = (
     "L", "LP", "CC", "C", "CP", "CR", "CT", "CHF", "RND", "CYCL DEF 7.1", "CYCL DEF 8.1", "CYCL DEF 10.1",
-    "CYCL DEF 11.1", "CYCL DEF 200", "CYCL DEF 201", "CYCL DEF 207", "PLANE SPATIAL", "PLANE RESET", "LBL", "CALL LBL",
-    "FN12", "Q",
+    "CYCL DEF 11.1",
+    "CYCL DEF 14.1", "CYCL DEF 20", "CYCL DEF 22", "CYCL DEF 24", "CYCL DEF 25",
+    "CYCL DEF 200", "CYCL DEF 201", "CYCL DEF 207", "PLANE SPATIAL", "PLANE RESET", "LBL", "CALL LBL",
+    "FN12", "Q", "CYCL DEF 208", "CYCL DEF 251", "CYCL DEF 252", "CYCL DEF 253", "CYCL DEF 256", "CYCL DEF 257", "FL",
+    "FLT", "FCT", "PATTERN DEF", "CYCL CALL PAT", "TOOL DEF",
 )  # fmt: skip
 UNHELD = ("BEGIN PGM", "END PGM", "FUNCTION RESET TCPM", "M")
 

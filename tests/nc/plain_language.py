@@ -10,6 +10,8 @@ import re
 
 import numpy as np
 
+from tests.nc import milled_areas
+
 NAMES = {"SIN": lambda d: math.sin(math.radians(d)), "COS": lambda d: math.cos(math.radians(d)), "SQRT": math.sqrt}
 SHARES = (0.25, 0.5, 0.75, 1.0)
 
@@ -23,7 +25,11 @@ def turn_about(axis: int, degrees: float) -> np.ndarray:
 
 
 class Reader:
-    """Reads a program; `moves` are (kind, points (4, 3) in mm, tool axis)."""
+    """Reads a program; `moves` are (kind, points (4, 3) in mm, tool axis).
+
+    A milling cycle, whose inner way no manual gives, is one: ("M", line, (claim, frame, end or None)). "E" is a rapid
+    from where such a cycle ended, of which only the end is known.
+    """
 
     def __init__(self, text: str) -> None:
         self.lines = [re.sub(r"^\d+ ", "", line) for line in text.splitlines()]
@@ -35,6 +41,7 @@ class Reader:
         self.shift, self.inner, self.angle, self.mirror, self.factor = np.zeros(3), np.zeros(3), 0.0, set(), 1.0
         self.tilt = np.eye(4)
         self.cycle, self.modal, self.ended = None, False, False
+        self.radius, self.data, self.labels, self.pattern, self.lost = 0.0, {}, [], [], False
         self.run(0, len(self.lines))
 
     @property
@@ -86,8 +93,18 @@ class Reader:
 
     def statement(self, line: str, row: int) -> None:
         head = line.split(maxsplit=1)[0] if line else ""
-        words = self.words(line)
-        if head.startswith("Q") and "=" in line:
+        words, self.row = self.words(line), row
+        if line.startswith("TOOL DEF"):
+            self.radius = self.number(words["R"])
+        elif line.startswith("CYCL DEF 14.1"):
+            self.labels = re.findall(r"\d+", line.split("LABEL")[1])
+        elif line.startswith("PATTERN DEF"):
+            self.pattern = [point for form in re.findall(r"([A-Z]+)\d \(([^)]*)\)", line) for point in points_of(*form)]
+        elif line.startswith("CYCL CALL PAT"):
+            self.visit()
+        elif head in ("FL", "FLT", "FCT"):
+            self.free(head, line)
+        elif head.startswith("Q") and "=" in line:
             name, formula = line.split("=", 1)
             values = {f"v{k[1:]}": v for k, v in self.q.items()}
             self.q[name.strip()] = eval(re.sub(r"Q(\d+)", r"v\1", formula).replace("^", "**"), {**NAMES, **values})
@@ -116,8 +133,12 @@ class Reader:
             self.tilt = new
             self.moved()
         elif line.startswith("CYCL DEF 2"):
-            self.cycle = int(line.split()[2]), {k: self.number(v) for k, v in re.findall(r"(Q\d+)=(\S+)", line)}
-            self.modal = False
+            values = {k: self.number(v) for k, v in re.findall(r"(Q\d+)=(\S+)", line)}
+            self.q |= values
+            if line.startswith("CYCL DEF 20 "):
+                self.data = values
+            else:
+                self.cycle, self.modal = (int(line.split()[2]), values), False
         elif head in ("L", "LP", "C", "CP", "CR", "CT"):
             self.contour(head, line, words, row)
         elif head == "CC":
@@ -222,6 +243,8 @@ class Reader:
 
     def add(self, kind: str, points: list) -> None:
         placed = np.array([(self.frame @ [*point, 1.0])[:3] for point in points])
+        if self.lost:
+            kind, self.lost = "E", False
         if np.abs(placed - self.where).max() > 1e-9:
             self.moves.append((kind, placed, self.tilt[:3, 2]))
         self.where = placed[-1]
@@ -233,6 +256,9 @@ class Reader:
 
     def drill(self) -> None:
         number, q = self.cycle
+        if number not in (200, 201, 207):
+            self.mill(number, q)
+            return
         top, floor, clear = q["Q203"], q["Q203"] + q["Q201"], q["Q203"] + q["Q200"]
         self.to("R", clear)
         depth = top
@@ -247,6 +273,64 @@ class Reader:
         if q["Q204"] > q["Q200"]:
             self.to("R", top + q["Q204"])
         self.heading = None
+
+    def mill(self, number: int, q: dict[str, float]) -> None:
+        """A milling cycle: what it says of its path, and where the tool stands after it."""
+        end = None
+        if number in (22, 24, 25):
+            named = self.labels if number != 25 else self.labels[:1]
+            claim = milled_areas.contour_cycle(number, self.data | q, [self.chain(name) for name in named], self.radius)
+            self.lost, self.at = True, np.array([*self.at[:2], (self.data | q)["Q7"]])
+        else:
+            claim, end = milled_areas.form(number, q, complex(*self.at[:2]), self.radius)
+            self.at = np.array(end)
+        self.moves.append(("M", self.row + 1, (claim, self.frame, end)))
+        self.where, self.heading = (self.frame @ [*self.at, 1.0])[:3], None
+
+    def chain(self, label: str) -> tuple[list[complex], int]:
+        """Corners of a contour of straight lines, and +1 for RL."""
+        first = self.label(label) + 1
+        lines = self.lines[first : self.lines.index("LBL 0", first)]
+        words = [self.words(line) for line in lines]
+        return [complex(float(w["X"]), float(w["Y"])) for w in words], 1 if "RL" in lines[0] else -1
+
+    def visit(self) -> None:
+        """CYCL CALL PAT: the cycle at each point, the tool not below where it stands."""
+        (number, q), least = self.cycle, self.at[2]
+        for place, more in self.pattern:
+            top = q["Q203"] + more
+            self.to("R", max(top + q["Q200"], top + q["Q204"], least))
+            there = np.array([*place, self.at[2]])
+            self.add("R", [self.at + share * (there - self.at) for share in SHARES])
+            self.at, self.cycle = there, (number, q | {"Q203": top})
+            self.drill()
+        self.cycle = number, q
+
+    def free(self, head: str, line: str) -> None:
+        """An element of a free contour that its own data determine."""
+        w = {k: float(v) for k, v in re.findall(r"(?<![A-Z])(AN|LEN|CCA|R|X|Y)([+-]?[\d.]+)", line)}
+        here, ahead = complex(*self.at[:2]), complex(*self.heading)
+        if head == "FCT":
+            turn = 1.0 if "DR+" in line else -1.0
+            center = here + 1j * turn * w["R"] * ahead
+            spins = [np.exp(1j * turn * math.radians(w["CCA"]) * share) for share in SHARES]
+            points, ahead = [center + (here - center) * spin for spin in spins], ahead * spins[-1]
+        else:
+            ahead = np.exp(1j * math.radians(w["AN"])) if "AN" in w else ahead
+            end = complex(w["X"], w["Y"]) if "X" in w else here + w["LEN"] * ahead
+            points, ahead = [here + share * (end - here) for share in SHARES], (end - here) / abs(end - here)
+        self.add("F", [np.array([p.real, p.imag, self.at[2]]) for p in points])
+        self.at, self.heading = np.array([points[-1].real, points[-1].imag, self.at[2]]), [ahead.real, ahead.imag]
+
+
+def points_of(kind: str, text: str) -> list[tuple[tuple[float, float], float]]:
+    """Points of a form of PATTERN DEF, with what each adds to the surface."""
+    w = {k: float(v) for k, v in re.findall(r"([A-Z]+)([+-]?[\d.]+)", text)}
+    start, count = complex(w["X"], w["Y"]), int(w.get("NUM", 1))
+    steps = [w.get("D", 0.0) * k * np.exp(1j * math.radians(w.get("ROT", 0.0))) for k in range(count)]
+    if kind == "CIRC":
+        steps = [w["D"] / 2.0 * np.exp(1j * math.radians(w["START"] + 360.0 * k / count)) for k in range(count)]
+    return [((place.real, place.imag), w["Z"]) for place in (start + step for step in steps)]
 
 
 def random_program(seed: int) -> str:
@@ -272,6 +356,7 @@ def _statements(chance: random.Random) -> list[str]:
         "BEGIN PGM HUNT MM",
         "BLK FORM 0.1 Z X-50 Y-50 Z-50",
         "BLK FORM 0.2 X+50 Y+50 Z+0",
+        "TOOL DEF 1 L+0 R+3",
         "TOOL CALL 1 Z S1000 F500",
     ]
     lines += [
@@ -282,8 +367,19 @@ def _statements(chance: random.Random) -> list[str]:
     lines += ["L X+1 Y+2 Z+30 R0 FMAX M3"]
     tilted, subs, labels = False, [], 10
     for _ in range(chance.randrange(3, 14)):
-        kind = chance.randrange(12)
-        if kind == 0:
+        kind = chance.randrange(16)
+        if kind > 11:
+            place = [f"CYCL DEF 7.1 {_point(chance)}", f"CYCL DEF 10.1 ROT{chance.uniform(-180, 180):+.2f}"]
+            lines += [*RESET, *(place if chance.random() < 0.7 else []), "L X+1 Y+2 Z+30 FMAX"]
+            if kind == 12:
+                lines += milled_areas.random_form(chance)
+            elif kind == 13:
+                labels += 2
+                milled, drawn = milled_areas.random_contours(chance, labels - 1)
+                lines, subs = [*lines, *milled], [*subs, *drawn]
+            else:
+                lines += (milled_areas.random_free if kind == 14 else milled_areas.random_pattern)(chance)
+        elif kind == 0:
             lines += _frame(chance)
         elif kind == 6:
             lines += _cam(chance)
@@ -365,8 +461,10 @@ def _cam(chance: random.Random) -> list[str]:
     ]
 
 
+RESET = ("CYCL DEF 10.1 ROT+0", "CYCL DEF 8.1", "CYCL DEF 11.1 SCL 1")
+
+
 def _frame(chance: random.Random) -> list[str]:
-    reset = ["CYCL DEF 10.1 ROT+0", "CYCL DEF 8.1", "CYCL DEF 11.1 SCL 1"]
     inner = chance.choice(
         (
             ["CYCL DEF 10.1 ROT" + f"{chance.uniform(-180, 180):+.2f}"],
@@ -375,7 +473,7 @@ def _frame(chance: random.Random) -> list[str]:
         )
     )
     scale = [f"CYCL DEF 11.1 SCL {chance.choice((0.5, 2, 1.25))}"] if chance.random() < 0.3 else []
-    return [*reset, f"CYCL DEF 7.1 {_point(chance)}", *inner, *scale, f"L {_point(chance)} FMAX"]
+    return [*RESET, f"CYCL DEF 7.1 {_point(chance)}", *inner, *scale, f"L {_point(chance)} FMAX"]
 
 
 def _run(chance: random.Random, steps: bool = False) -> list[str]:

@@ -33,6 +33,11 @@ FOLDER = Path(__file__).parent
 TOOLS = Controller(tools={1: ToolEntry(1, diameter=10.0, remark="MILL 10"), 2: ToolEntry(2, length=50.0, diameter=4.0)})
 DRILL = "CYCL DEF 200 BOHREN ~\n Q200=2 ;A ~\n Q201=-{depth} ;B ~\n Q206=150 ~\n Q202=5 ~\n Q203=+0 ~\n Q204={far}\n"
 BORE = "CYCL DEF 208 B Q200=2 Q201=-6 Q206=100 Q334=4 Q203=0 Q{}={}"
+SL = (
+    "CYCL DEF 14.1 LABEL 1\nCYCL DEF 20 D Q1=-4 Q2=1 Q3=0 Q4=0 Q5=0 Q6=2 Q7=9 Q8=0 Q9=1\n"
+    "CYCL DEF 22 R Q10=2 Q11=50 Q12=300 Q18=0\nM3\nCYCL CALL"
+)
+SQUARE = "LBL 1\nL X+0 Y+0 RL\nL X+30\nL Y+30\nL X+0\nL X+0 Y+0\nLBL 0"
 POCKET = "CYCL DEF {} P Q215=0 Q368=0 Q207=300 Q201=-10 Q202=4 Q369=0 Q206=50 Q200=2 Q203=0 Q204=5 {}"
 PATHS = {  # name -> statements, path
     name: (body, path)
@@ -87,7 +92,7 @@ def test_random_programs_are_read_as_the_independent_reader_reads_them(first):
 
 
 def test_a_reading_that_errs_is_found_out():
-    text = random_program(7)
+    text = random_program(8)
     assert not heidenhain.difference(text)
     for right, wrong in (("DR+", "DR-"), (" FMAX", " F20"), ("+ 0", "+ 0")):
         wronged = text.replace(right, wrong, 1)
@@ -182,6 +187,25 @@ REFUSALS = {
     f"{POCKET.format(252, 'Q223=40 Q370=-1')}\nM99": ("no overlap", 4),
     f"{POCKET.format(252, 'Q223=40').replace('Q202=4', 'Q202=0.0001')}\nM99": ("too many rounds", 4),
     f"{POCKET.format(252, 'Q223=40').replace('Q207=300', 'Q207=MAX')}\nM99": ("mills at FMAX", 4),
+    f"{SL.replace('Q18=0', 'Q18=3')}\nM30\n{SQUARE}": ("Q18 names a tool of unknown radius", 7),
+    f"{SL.replace('Q1=-4', 'Q1=4')}\nM30\n{SQUARE}": ("is not below the surface", 7),
+    f"{SL.replace('Q7=9', 'Q7=1')}\nM30\n{SQUARE}": ("is below the surface and its clearance", 7),
+    f"{SL.replace('Q10=2', 'Q10=0.0001')}\nM30\n{SQUARE}": ("too many infeeds", 7),
+    f"{SL.replace('Q2=1', 'Q2=2')}\nM30\n{SQUARE}": ("is no overlap", 7),
+    f"{SL.replace('Q12=300', 'Q12=MAX')}\nM30\n{SQUARE}": ("mills at FMAX", 7),
+    f"{SL.replace('M3', 'M4')}\nM30\n{SQUARE}": ("M4 or cycle 8 decides", 7),
+    f"{SL.replace('CYCL CALL', 'Q10 = 5')}\nM99\nM30\n{SQUARE}": ("after Q10 was set again", 8),
+    f"{SL.replace('Q10=2', 'Q99=2')}\nM30\n{SQUARE}": ("without Q10", 5),
+    f"{SL}\nM30\n{SQUARE.replace(' RL', '')}": ("contour that is open, or has no side", 7),
+    f"{SL}\nM30\n{SQUARE.replace(' RL', ' RR')}": ("islands without a pocket", 7),
+    f"{SL}\nM30\n{SQUARE.replace('X+0 Y+0', 'X+0 Y+1', 1)}": ("contour that is open, or has no side", 7),
+    f"{SL}\nM30\n{SQUARE.replace('L Y+30', 'L Y+30 Z-1')}": ("leaves its plane", 7),
+    f"{SL}\nM30\n{SQUARE.replace(' Y+0 RL', ' RL')}": ("does not say where it begins", 7),
+    f"{SL}\nM30\n{SQUARE.replace('LBL 0', 'RND R5')}\nLBL 0": ("ends before the element behind a corner", 7),
+    f"{SL}\nM30\n{SQUARE.replace('L Y+30', 'CYCL DEF 7.1 X+9')}": ("CYCL DEF 7.1 in a contour of cycle 14", 12),
+    f"{SL}\nM30\n{SQUARE.replace('LBL 0', 'END PGM T MM')}": ("END PGM in a contour", 15),
+    f"{SL}\nL X+1 F100\nM30\n{SQUARE}": ("tool's place is not known", 8),
+    "CYCL DEF 25 T Q1=-2 Q3=0 Q5=0 Q7=1 Q10=1 Q11=9 Q12=9 Q15=1\nM99": ("cycles 14 and 20 before it", 4),
     "Q5 = 1\nTCH PROBE 0.0 PLANE Q5 X-\nTCH PROBE 0.1 X+5\nL X+Q5": ("Q5 is read before it is set", 6),
     "TCH PROBE 412 X ~\n Q320=5\nL X+1": ("place is not known", 5),
     "PATTERN DEF POS1": ("form that is not known", 3),

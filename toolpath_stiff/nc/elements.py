@@ -10,6 +10,7 @@ import math
 from toolpath_stiff.nc.geometry import refuse_arc_if, turn_between
 
 Element = tuple[complex, complex, complex | None, int]
+Contour = list[Element]
 STRAIGHT_ON = 1e-6  # rad
 REACHED = 1e-9  # mm, rad
 TOO_LONG = "a corner that does not fit its contour elements"
@@ -21,6 +22,12 @@ def direction(element: Element, place: complex) -> complex:
     ahead = end - start if center is None else turn * 1j * (place - center)
     refuse_arc_if(not abs(ahead), "a corner at an element of no length", "two elements")
     return ahead / abs(ahead)
+
+
+def swept(element: Element) -> float:
+    """Signed angle of an arc; 0 of a line."""
+    start, end, center, turn = element
+    return turn_between(cmath.phase(start - center), cmath.phase(end - center), turn < 0) if center is not None else 0.0
 
 
 def _foot(element: Element, place: complex) -> complex:

@@ -10,6 +10,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+from toolpath_stiff.nc.elements import Element, direction
 from toolpath_stiff.nc.geometry import refuse_arc_if
 
 LEAST_MM = 1e-9  # a side or a step of less is none
@@ -132,23 +133,42 @@ def pocket(outer: Outline, step: float, heights: Heights, feeds: Feeds, turn: in
         above = floor
 
 
-def edge(path: Outline, heights: Heights, feeds: Feeds, turn: int, lead: float) -> Iterator[Cut]:
-    """Once round at each height, led in and out on quarter circles; outside, where `lead` is negative, on half ones."""
+def along(
+    path: list[Element],
+    free: int,
+    heights: Heights,
+    feeds: Feeds,
+    size: float,
+    half: bool = False,
+    top: float = math.inf,
+) -> Iterator[Cut]:
+    """Along a path at each height, led in and out on quarters of circles (or halves) from its free side: +1 left.
+
+    `free` 0 or `size` 0: from above straight down. `top`: of the work, where that is not just below the safe height.
+    """
     (floors, safe, ahead), (feed, down) = heights, feeds
-    above = safe
-    begin = path.at(0.0, -path.width / 2.0)
-    center, arc = path.at(0.0, lead - path.width / 2.0), turn if lead > 0.0 else -turn
-    turned = -1.0 if lead < 0.0 else arc * 1j
+    above, leads = min(safe, top), list[tuple[complex, complex]]()
+    for element, place, way in ((path[0], path[0][0], -1), (path[-1], path[-1][1], 1)):
+        center = place + free * 1j * direction(element, place) * size
+        leads.append((center + (place - center) * (-1.0 if half else free * way * 1j), center))
+    (start, into), (end, out) = leads
     for floor in floors:
-        start, end = center + (begin - center) / turned, center + (begin - center) * turned
         yield start, safe, None, None, 0
         yield start, min(above + ahead, safe), None, None, 0
         yield start, floor, down, None, 0
-        if lead:
-            yield begin, floor, feed, center, arc
-        for place, about in path.around(turn):
-            yield place, floor, feed, about, turn
-        if lead:
-            yield end, floor, feed, center, arc
+        if free and size:
+            yield path[0][0], floor, feed, into, free
+        for _, to, about, turn in path:
+            yield to, floor, feed, about, turn
+        if free and size:
+            yield end, floor, feed, out, free
         yield end, safe, None, None, 0
         above = floor
+
+
+def edge(path: Outline, heights: Heights, feeds: Feeds, turn: int, lead: float) -> Iterator[Cut]:
+    """Once round at each height, led in and out on quarter circles; outside, where `lead` is negative, on half ones."""
+    legs, begin = path.around(turn), path.at(0.0, -path.width / 2.0)
+    starts = [begin, *(end for end, _ in legs)]
+    ring = [(start, end, center, turn) for start, (end, center) in zip(starts, legs, strict=False)]
+    yield from along(ring, turn if lead > 0.0 else -turn, heights, feeds, abs(lead), half=lead < 0.0)

@@ -210,6 +210,8 @@ class Conversational:
         G500 in force: "machine", or "zero" where the program takes no other offset; "": it is not.
     contour
         Elements of the contour that CYCLE72 mills.
+    labels, contour_data, drawn
+        Cycles 14 and 20, and what draws the contour of a label, with its side: +1 RL, -1 RR, 0.
     offsets_named, changes_by_t, transformed
         Whether the program takes settable offsets, and changes tools by T alone; TRAORI in force.
     """
@@ -251,6 +253,9 @@ class Conversational:
     feed_place: str = ""
     base: str = ""
     contour: list[Element] = field(default_factory=list)
+    labels: list[float] = field(default_factory=list)
+    contour_data: dict[str, float] = field(default_factory=dict)
+    drawn: Callable[[CurrentBlock, float], tuple[list[Element], int]] | None = None
     offsets_named: bool = False
     changes_by_t: bool = False
     transformed: bool = False

@@ -25,11 +25,15 @@ Values = dict[str, float]
 Stroke = tuple[float, float | None, float]  # height, feed, dwell after it
 
 _ALL, _DRILL = ("Q200", "Q201", "Q203"), ("Q200", "Q201", "Q206", "Q203")
+CONTOURS = {
+    20: tuple(f"Q{number}" for number in range(1, 10)), 22: ("Q10", "Q11", "Q12"), 23: ("Q11", "Q12"),
+    24: ("Q9", "Q10", "Q11", "Q12", "Q14"), 25: ("Q1", "Q3", "Q5", "Q7", "Q10", "Q11", "Q12", "Q15"),
+}  # fmt: skip
 NEEDED = {
     200: (*_DRILL, "Q202"), 201: _DRILL, 202: _DRILL, 203: (*_DRILL, "Q202"), 205: (*_DRILL, "Q202"), 206: _DRILL,
     207: (*_ALL, "Q239"), 209: (*_ALL, "Q239", "Q257", "Q256"), 240: _DRILL, 241: _DRILL,
     220: ("Q216", "Q217", "Q244", "Q245", "Q246", "Q247", "Q241"),
-    221: ("Q225", "Q226", "Q237", "Q238", "Q242", "Q243", "Q224"), **MILLED,
+    221: ("Q225", "Q226", "Q237", "Q238", "Q242", "Q243", "Q224"), **MILLED, **CONTOURS,
 }  # fmt: skip
 PECKS, TAPS = (200, 203, 205), (207, 209)
 # Cycles of older controls, with parameters in statements -> the cycle whose moves they make, and the parameters of each
@@ -42,7 +46,8 @@ OLDER = {
 KNOWN = {"Q200", "Q201", "Q202", "Q203", "Q204", "Q205", "Q206", "Q208", "Q210", "Q211", "Q212", "Q213", "Q214", "Q239",
          "Q256", "Q257", "Q258", "Q259", "Q253", "Q336", "Q343", "Q344", "Q351", "Q379", "Q395", "Q403", "Q301", "Q365",
          "Q357", "Q359", "Q350", "Q426", "Q427", "Q428", "Q429", "Q430", "Q435", "Q401", "Q207", "Q215", "Q220", "Q224",
-         "Q334", "Q338", "Q342", "Q366", "Q367", "Q368", "Q369", "Q370", "Q374", "Q385", "Q437", "Q439"}  # fmt: skip
+         "Q334", "Q338", "Q342", "Q366", "Q367", "Q368", "Q369", "Q370", "Q374", "Q385", "Q437", "Q439",
+         "Q18", "Q19", "Q404", "Q438"}  # fmt: skip
 FEEDS = ("Q206", "Q207", "Q208", "Q253", "Q385")
 LEAST_AHEAD_MM, MOST_AHEAD_MM = 0.6, 7.0  # end of the older pecking's rapids above the last depth
 MOST_POINTS = 1000
@@ -62,13 +67,18 @@ def define(state: State, block: CurrentBlock, code: str) -> None:
     block.refuse_if(missing, None, f"without {missing}", f"{', '.join(NEEDED[number])}")
     unknown = next((name for name in values if name not in KNOWN and name not in NEEDED[number]), None)
     block.refuse_if(unknown, unknown, f"is no parameter of {code} that is known")
+    plain = state.plain
     if number in (220, 221):
         _pattern(state, block, number, values)
         return
-    _check(block, number, values)
+    if number == 20:
+        plain.contour_data = values
+        return
+    if number not in CONTOURS:
+        _check(block, number, values)
     if values.get("Q214"):
         state.note(block.line, block.values["Q214"], HAVE_NO_SHIFT)
-    state.plain.cycle, state.plain.modal = (number, values), False
+    plain.cycle, plain.modal = (number, values), False
 
 
 def define_older(state: State, block: CurrentBlock, code: str) -> None:
@@ -117,6 +127,12 @@ def call(state: State, block: CurrentBlock, change: Values | None = None) -> Non
     if plain.cycle is None:
         raise block.fail(None, "calls a cycle, and none is defined", "CYCL DEF before it")
     outside_contour(state, block, "calls a cycle")
+    if plain.cycle[0] in CONTOURS:
+        from toolpath_stiff.nc.heidenhain.contour_cycles import mill_contours  # which takes Shapely
+
+        block.refuse_if(change, None, "calls a cycle of contours at a point", "CYCL CALL or M99")
+        mill_contours(state, block, *plain.cycle)
+        return
     unit, (number, values), change = state.length_scale, plain.cycle, change or {}
     if "Q203" in values:
         kept = (name for name, value in values.items() if plain.parameters.get(name, value) != value)

@@ -63,8 +63,7 @@ def mill_form(state: State, block: CurrentBlock, number: int, values: Values) ->
         block.refuse_if(wrong, name, problem, expected)
     if not radius:  # in a check, behind the error that it is not known
         return
-    if INSIDE not in [remark.text for remark in state.warnings]:
-        state.warnings.append(Remark(INSIDE, block.line))
+    note_inside(state, block)
     known = {MAX: None, AUTO: state.plain.tool_feed or 0.0}
     down, feed, fine = (known.get(given[name], given[name] * tenths) for name in ("Q206", "Q207", "Q385"))
     turn = (1 if given["Q351"] >= 0.0 else -1) * (-1 if stud else 1)
@@ -74,6 +73,12 @@ def mill_form(state: State, block: CurrentBlock, number: int, values: Values) ->
     cuts += _cuts(number, given, path, radius, overlap * radius, (feed or 0.0, down), fine or feed or 0.0, turn)
     cuts.append((path.middle, far, None, None, 0))
     mill(state, block, ((p * unit, h * unit, rate, None if c is None else c * unit, t) for p, h, rate, c, t in cuts))
+
+
+def note_inside(state: State, block: CurrentBlock) -> None:
+    """Warn, once, that the way inside a form is assumed."""
+    if INSIDE not in [remark.text for remark in state.warnings]:
+        state.warnings.append(Remark(INSIDE, block.line))
 
 
 def _form(block: CurrentBlock, number: int, given: Values, here: complex) -> Outline:
@@ -89,7 +94,7 @@ def _form(block: CurrentBlock, number: int, given: Values, here: complex) -> Out
     return replace(form, middle=form.at(-(lengths * length + widths * width) / 2.0, -across * width / 2.0))
 
 
-def _floors(top: float, bottom: float, most: float) -> list[float]:
+def floors_of(top: float, bottom: float, most: float) -> list[float]:
     """Heights of infeeds, the last one shorter; 0: one infeed."""
     count = math.ceil((top - bottom) / most - LEAST_MM) if most > 0.0 else 1
     return [top - index * most for index in range(1, count)] + [bottom]
@@ -101,7 +106,7 @@ def _cuts(
     """Cuts of a form: of pockets roughing (Q215 0 and 1), then what has allowances (0 and 2), walls first."""
     top, bottom, ahead, part = given["Q203"], given["Q203"] + given["Q201"], given["Q200"], given["Q215"]
     half, side = path.width / 2.0, given["Q368"]
-    floors = _floors(top, bottom + given["Q369"], given["Q202"])
+    floors = floors_of(top, bottom + given["Q369"], given["Q202"])
     if number == BORE:
         yield from sink(path, (top + ahead, bottom), feeds[1], turn, ("helix", half, given["Q334"]))
         yield path.middle, top + ahead, None, None, 0
@@ -121,7 +126,7 @@ def _cuts(
             yield from pocket(rough, step, (floors, top + ahead, ahead), feeds, turn, ("", 0.0, 0.0))
         lead = min(radius, path.length / 2.0, half)
         if part != 1.0 and side and lead > LEAST_MM:
-            heights = _floors(top, bottom, given["Q338"]), top + ahead, ahead
+            heights = floors_of(top, bottom, given["Q338"]), top + ahead, ahead
             yield from edge(path, heights, (fine, feeds[1]), turn, lead)
         if part != 1.0 and given["Q369"]:
             yield from pocket(path, step, ([bottom], top + ahead, ahead), (fine, feeds[1]), turn, ("", 0.0, 0.0))

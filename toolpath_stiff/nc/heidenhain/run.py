@@ -7,11 +7,15 @@ straight statements, most of a CAM system's program, are written as G0 and G1 an
 import math
 import re
 from contextlib import nullcontext, suppress
+from dataclasses import replace
 from pathlib import PurePath
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes.code import Code
+from toolpath_stiff.nc.elements import Element
+from toolpath_stiff.nc.heidenhain.contour import SIDES
 from toolpath_stiff.nc.heidenhain.cycles import call, pattern
+from toolpath_stiff.nc.heidenhain.drawing import drawing, elements_of
 from toolpath_stiff.nc.heidenhain.expressions import CONDITIONS, PARAMETER, assigned, condition, work_out
 from toolpath_stiff.nc.heidenhain.free_contour import CORNERS, FREE, NOT_DETERMINED
 from toolpath_stiff.nc.heidenhain.functions import miscellaneous, retract
@@ -29,9 +33,11 @@ from toolpath_stiff.nc.run_records import Subprogram, Tally, beyond_the_end
 from toolpath_stiff.nc.state import CurrentBlock, Flow
 from toolpath_stiff.nc.words import Block, Word
 
-CALLED = re.compile(r'\s*(?:(\d+|Q[LR]?\d+)|"([^"]*)")\s*(REP\s*(\d+|Q[LR]?\d+)?\s*(?:/\s*\d+)?)?\s*$')
+CALLED = re.compile(r'\s*(?:(\d+|Q[LR]?\d+)|"([^"]*)")\s*(REP\s*(\d+|Q[LR]?\d+)?\s*(?:/\s*(?:\d+|Q[LR]?\d+))?)?\s*$')
+END_OF_LABEL = re.compile(r"\s*0+\s*")
 CONTOUR = frozenset(("RND", "CHF", "L", "LP", "C", "CP", "CR", "CT", "CTP", "LN", *FREE))
 FORMULAS = ("FN0", "FN1", "FN2", "FN3", "FN4", "FN5", "FN6", "FN7", "FN8", "FN13")
+DRAWS = CONTOUR | {"CC", "FPOL", "M", "LBL", "CALL LBL", *FORMULAS, *CONDITIONS}
 OF_CONTROL = ("FN18", "FN28")
 TO_MACHINE = ("M91", "M92")  # with these FMAX may lead to an unknown point
 TILTING = ("Q120", "Q121", "Q122")  # positions of A, B, C that the control computes for a tilted plane
@@ -45,7 +51,7 @@ class HeidenhainRun(ProgramRun):
 
     def __init__(self, request: Request, tally: Tally | None = None) -> None:
         super().__init__(request, tally, fast=False)
-        self.state.plain.tool_feed = request.controller.feed
+        self.state.plain.tool_feed, self.state.plain.drawn = request.controller.feed, self._drawn
         self._plain = self._lexer = PlainRun(self.state, as_g_code(self.lines), self.name)
         self._statements: dict[int, PlainStatement] = {}
         self._has_labels = any("LBL" in line.upper() for line in self.lines)  # without any no statement runs again
@@ -119,7 +125,9 @@ class HeidenhainRun(ProgramRun):
         unused = next((letter for letter in block.values if letter in block.free), None)
         if unused is not None and not head.startswith("APPR") and not plain.free and head not in FREE:
             raise block.fail(unused, f"is no word of {head}", "its own words")
-        positioned = head in ("L", "LP") and (len(self.state.recorder) > before or bool(block.values.keys() & {*"XYZ"}))
+        positioned = head in ("L", "LP") and (
+            len(self.state.recorder) > before or bool(block.values.keys() & {*"XYZ", "IX", "IY", "IZ"})
+        )
         if once is not None or ((modal is not None or plain.modal) and positioned):
             call(self.state, block)
         plain.modal = (plain.modal or modal is not None) and once is None
@@ -186,6 +194,8 @@ class HeidenhainRun(ProgramRun):
                     del scope[word.letter]
         elif head == "PATTERN DEF":
             pattern(self.state, block, rest, lambda text: self._value(row, text.replace(",", "."), statement.begins))
+        elif head == "CYCL DEF 14.1":
+            self.state.plain.labels = [float(number) for number in re.findall(r"\d+", rest)]
         elif head in CONDITIONS:
             holds, number, name = condition(head, rest, self._parameter, place)
             return self._jump_back(row, self._label(row, number, name)) if holds else after
@@ -209,7 +219,7 @@ class HeidenhainRun(ProgramRun):
             return self._program(row, statement)
         elif head == "END PGM" and not self._levels:
             return None
-        elif head == "END PGM" or (head == "LBL" and self._levels and re.fullmatch(r"\s*0+\s*", rest)):
+        elif head == "END PGM" or (head == "LBL" and self._levels and END_OF_LABEL.fullmatch(rest)):
             level = self._levels[-1]
             if head == "END PGM" and level.arguments is None:
                 raise self._fail(row, f"the subprogram {level.name} of line {level.first + 1} has no end", "LBL 0")
@@ -234,6 +244,34 @@ class HeidenhainRun(ProgramRun):
         if len(places) != 1:
             raise self._fail(row, f"LBL {shown}: the program has {'several' if places else 'none'}", "one label")
         return places[0]
+
+    def _drawn(self, block: CurrentBlock, label: float) -> tuple[list[Element], int]:
+        """The contour of a label, with the side of its compensation, drawn beside the run."""
+        state, base, side, row = self.state, len(self._levels), 0, self._label(self._at, f"{label:g}", None) + 1
+        self.state = drawn = drawing(state)
+        drawn.plain.parameters, drawn.plain.radius, drawn.plain.tool_feed = (
+            state.plain.parameters,
+            state.plain.radius,
+            1.0,
+        )
+        try:
+            while (
+                (statement := self._statement(row)).head != "LBL"
+                or len(self._levels) > base
+                or not END_OF_LABEL.fullmatch(statement.rest)
+            ):
+                self._count_block(row)
+                if statement.head and statement.head not in DRAWS and statement.head[0] != "Q":
+                    raise self._fail(
+                        row, f"{statement.head} in a contour of cycle 14", "contour elements, Q parameters"
+                    )
+                side = next((SIDES[word.letter] for word in statement.words if word.letter in SIDES), side)
+                words = tuple(w._replace(letter="R0") if w.letter in SIDES else w for w in statement.words)
+                row = self._acted(row, replace(statement, words=words)) if statement.head else statement.after
+            self._end(row, "the contour")
+            return elements_of(drawn, block, "a cycle"), side
+        finally:
+            self.state = state
 
     def _call(self, row: int, statement: PlainStatement) -> int:
         called = CALLED.match(statement.rest)

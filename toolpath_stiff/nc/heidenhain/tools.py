@@ -27,15 +27,16 @@ def tool_call(state: State, block: CurrentBlock, code: str) -> None:
     state.speed = state.speed if speed is None else speed
     if rate is not None:
         state.feed = plain.tool_feed = rate * inch_tenths(state) or None
-    number = tool_number(state, block)
+    number, turn = tool_number(state, block), state.turn
     longer, wider = ((block.take(word) or 0.0) * state.length_scale for word in ("DL", "DR"))
     block.take("DR2")
-    if number is None:
-        block.refuse_if(longer or wider, None, "changes the tool in the spindle", "its number beside it")
+    if number is None and not longer and not wider:
         return
-    state.selected = number
+    block.refuse_if(number is None and not state.tool, None, "with DL or DR alone, and no tool", "a tool before it")
+    state.selected = state.tool if number is None else number
     change_tool(state, block, "M6")
-    entry = tool_of(state.tools, number)
+    state.turn = turn if number is None else state.turn
+    entry = tool_of(state.tools, state.tool)
     plain.radius = entry.diameter / 2.0 + wider
     frames, length = state.frames, entry.length + longer
     state.tool_length = length

@@ -99,6 +99,11 @@ _ROWS: Rows = (
          "rectangular, circular pocket; slot; rectangular, circular stud"),
         (f"{_parts(4, 0, 6)}|{_parts(5, 0, 5)}", cycles.define_older, "pockets, of older controls"),
     )),
+    ("motion", f"{_CYCLES}, Fixed cycles: contour pocket, contour trains", (
+        ("CYCL DEF 14.0|CYCL DEF 14.1", _SILENT, "labels of contours"),
+        ("CYCL DEF 20|CYCL DEF 22|CYCL DEF 23|CYCL DEF 24|CYCL DEF 25", cycles.define,
+         "contour pockets: shared data, rough-out, floor and side finishing; contour train"),
+    )),
     ("motion", _PATTERNS, (
         ("CYCL DEF 220|CYCL DEF 221", cycles.define, "the cycle on a circle, on lines"),
         ("PATTERN DEF", _SILENT, "points, rows, patterns, circles for CYCL CALL PAT"),

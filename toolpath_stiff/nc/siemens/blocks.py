@@ -1,19 +1,15 @@
 """A block in Siemens' language: words sorted, then codes in their order, then the move, then the cycles."""
 
-import math
 from collections.abc import Iterable
 
 from toolpath_stiff.nc.codes.code import code_name
 from toolpath_stiff.nc.elements import Element
-from toolpath_stiff.nc.frames import Frames
-from toolpath_stiff.nc.geometry import PLANES
+from toolpath_stiff.nc.heidenhain.drawing import drawing, elements_of
 from toolpath_stiff.nc.run_records import Tally
-from toolpath_stiff.nc.siemens.contours import elements_of
 from toolpath_stiff.nc.siemens.cycles import repeated
 from toolpath_stiff.nc.siemens.motion import move, moves, round_all
 from toolpath_stiff.nc.siemens.vocabulary import REFUSED, TABLE, WORDS
 from toolpath_stiff.nc.state import STEPS, CurrentBlock, Flow, State
-from toolpath_stiff.nc.tables import Offsets
 from toolpath_stiff.nc.words import Block
 
 SINGLE = ("motion", "distance", "plane", "cutter compensation", "work offset", "units", "feed mode")
@@ -83,14 +79,11 @@ def carry_out(state: State, block: CurrentBlock) -> None:
 
 def draw(state: State, block: CurrentBlock, blocks: Iterable[Block]) -> list[Element]:
     """Contour elements that blocks draw, up to the end of their program; the tool of `state` stays where it is."""
-    drawn = State(state.name, frames=Frames(Offsets(), None, (0.0,) * 6), dialect=state.dialect, feed=1.0, trace=[])
-    drawn.plane, drawn.inch, drawn.motion = state.plane, state.inch, "G1"
-    for axis in PLANES[state.plane][:2]:  # the contour has to say where it begins
-        drawn.frames.position[axis] = math.nan
+    drawn = drawing(state)
     for part in blocks:
         current = sort_words(drawn, part, None)
         with current.placing():
             carry_out(drawn, current)
         if current.flow is not Flow.NEXT:
             break
-    return elements_of(drawn, block)
+    return elements_of(drawn, block, "CYCLE72")

@@ -3,41 +3,18 @@
 SIEMENS, SINUMERIK 840D, Programming Guide Cycles (11/2002), "Milling cycles", "Path milling - CYCLE72".
 """
 
-import cmath
-
 from toolpath_stiff.nc.codes.cutter import switch_off
 from toolpath_stiff.nc.compensation import RadiusCompensation
-from toolpath_stiff.nc.elements import Element, direction
+from toolpath_stiff.nc.elements import direction
 from toolpath_stiff.nc.geometry import PLANES
 from toolpath_stiff.nc.heidenhain.contour import COMPENSATED, mill
-from toolpath_stiff.nc.pockets import LEAST_MM, Cut, layers
+from toolpath_stiff.nc.pockets import Cut, layers
 from toolpath_stiff.nc.siemens.milling import FINISH, approached, begin, digit
 from toolpath_stiff.nc.state import CurrentBlock, State
 
 SIDES = {0.0: 0, 40.0: 0, 41.0: 1, 42.0: -1}  # of RL
 NAMED, LABELLED = 1.0, 2.0  # TYPE of CYCLE62: by the labels that the control makes of its name, by two labels
 STRAIGHT, HALF = 1.0, 3.0  # AS1, AS2; 2: a quarter of a circle
-
-
-def elements_of(drawn: State, block: CurrentBlock) -> list[Element]:
-    """Contour elements from the trace of moves that its blocks made; the first goes to where the contour begins."""
-    first, second, normal = PLANES[drawn.plane]
-    contour, trace = list[Element](), drawn.trace or []
-    for move in trace[1:]:
-        begins, ends = (complex(point[first], point[second]) for point in (move.start, move.end))
-        block.refuse_if(
-            cmath.isnan(begins), None, "CYCLE72 along a contour that does not say where it begins", "X and Y"
-        )
-        level = abs(move.end[normal] - move.start[normal]) < LEAST_MM
-        block.refuse_if(not level, None, "CYCLE72 along a contour that leaves its plane", "moves in the plane")
-        if move.arc is not None:
-            turn = 1 if move.arc.sweep * move.arc.normal[normal] > 0.0 else -1
-            contour.append((begins, ends, complex(move.arc.center[first], move.arc.center[second]), turn))
-        elif abs(ends - begins) > LEAST_MM:
-            contour.append((begins, ends, None, 0))
-    arc = not contour or trace[0].arc is not None
-    block.refuse_if(arc, None, "CYCLE72 along no contour", "G1 to its start, and its elements")
-    return contour
 
 
 def contour_call(state: State, block: CurrentBlock, code: str) -> None:
