@@ -13,6 +13,7 @@ from toolpath_stiff.nc.codes.passive import m_parameters
 from toolpath_stiff.nc.codes.registry import CODES, REFUSED
 from toolpath_stiff.nc.codes.tools import list_numbers
 from toolpath_stiff.nc.geometry import ArcError
+from toolpath_stiff.nc.plain_lines import execute_straight
 from toolpath_stiff.nc.state import LAST_MODE, CurrentBlock, Flow, Group, State, Then
 from toolpath_stiff.nc.words import AXES, CORNERS, Block, Word
 
@@ -23,7 +24,7 @@ TAKERS: tuple[Group, ...] = ("non-modal", "rotation", "tool length")  # groups w
 
 def execute(state: State, block: Block) -> Then:
     """Execute a block; returns what runs after it. Raises `InputError` at a word, or at the block."""
-    if not block.words:
+    if not block.words or execute_straight(state, block):
         return Flow.NEXT
     return finish(state, begin(state, block))
 

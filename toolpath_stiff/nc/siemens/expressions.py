@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from operator import ge, gt, le, lt
 from typing import ClassVar
 
-from toolpath_stiff.nc.heidenhain.expressions import COMMON, Formula, Value, whole
+from toolpath_stiff.nc.heidenhain.expressions import COMMON, Formula, Value, simple_pattern, whole
 from toolpath_stiff.nc.parametric.expressions import ARITHMETIC
 
 STRING = re.compile(r'"[^"]*"')
@@ -37,6 +37,7 @@ class SiemensScanner(Formula):
 
     literal: ClassVar = re.compile(r"(?:\d++\.?\d*|\.\d+)(?:EX[+-]?\d+)?", re.ASCII)
     operator: ClassVar = re.compile(r"<<|<>|<=|>=|==|[-+*/<>]|(?:DIV|MOD|AND|XOR|OR)\b")
+    simple: ClassVar = simple_pattern(r"(?:[A-Z_]\w*|\d+\.?\d*|\.\d+)", r"[<>=]|(?:DIV|MOD|AND|XOR|OR)\b")
     name: ClassVar = re.compile(rf'"|{NAME.pattern}', re.ASCII)
     ranks: ClassVar = {
         **dict.fromkeys((*COMPARISONS, "==", "<>"), 1), "<<": 2, "OR": 3, "XOR": 4, "AND": 5, "+": 6, "-": 6,

@@ -15,7 +15,7 @@ from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.parametric.run import ParametricRun, Step
 from toolpath_stiff.nc.parametric.statements import Statement, Steering
 from toolpath_stiff.nc.parametric.variables import Values
-from toolpath_stiff.nc.plain_lines import PlainRun
+from toolpath_stiff.nc.plain_lines import PlainRun, execute_straight
 from toolpath_stiff.nc.plain_words import PlainWords
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.run_records import Subprogram, Tally, beyond_the_end
@@ -72,6 +72,7 @@ class SiemensRun(ParametricRun):
         self._labels, self._subs = labels_of(self._begins), programs_of(self._begins)
         begins = {row for row in self._subs.values() if any(code_text(text).strip() for text in self.lines[:row])}
         self._ends = begins | {row for row, text in enumerate(self.lines) if text == END_OF_FILE}
+        self._tangent = any(re.search(r"\bCT\b", begin.string) for begin in self._begins)  # needs directions
         self._plain = self._lexer = PlainRun(self.state, plain_texts(self.lines, self._begins), self.name)
 
     def run(self) -> list[Remark]:
@@ -113,12 +114,17 @@ class SiemensRun(ParametricRun):
 
     def _read(self, row: int) -> Block:
         statement, code = self._statement(row), self._begins[row].string
+        self._homes = IN_MACHINE.search(code) is not None
+        if row in self._called:
+            return self._called[row]
         line = row + 1 if row < self._main_lines else self._line_of_call()
         if self._is_head(row):
             return Block(line, ())
-        self._homes = IN_MACHINE.search(code) is not None
         words = read_words(self._scanner(row, self._begins[row].end()), self._define)
-        return Block(line, tuple(words), statement.block.optional, switch=statement.block.switch)
+        block = Block(line, tuple(words), statement.block.optional, switch=statement.block.switch)
+        if row < self._main_lines and self._lexer.lines[row] != "?":
+            self._called[row] = block
+        return block
 
     # Variables
 
@@ -178,12 +184,16 @@ class SiemensRun(ParametricRun):
 
     def _execute(self, block: Block) -> Then:
         state, plain = self.state, self.state.plain
+        usual = self._plain is not None and not (plain.modal or plain.renumbered or self._tangent)
+        if usual and not any(word.letter in "ABC" for word in block.words) and execute_straight(state, block):
+            plain.heading = None
+            return Flow.NEXT
         current = sort_words(state, block, self.tally)
         if "CYCLE72" in current.codes:
             plain.contour = draw(state, current, self._contour(current))
         with current.placing():
             carry_out(state, current)
-        slow = plain.modal or plain.held or plain.side or plain.unknown or plain.transformed or plain.base == "machine"
+        slow = plain.held or plain.side or plain.unknown or plain.transformed or plain.base == "machine"
         self._plain = None if slow or (plain.renumbered and not state.absolute) else self._lexer
         called = any(level.stop < 0 for level in self._levels)
         return Flow.RETURN if current.flow is Flow.END and called else current.flow
