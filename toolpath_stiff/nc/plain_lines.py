@@ -20,21 +20,21 @@ from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.codes.drilling import CYCLES
 from toolpath_stiff.nc.codes.feeds import SLOWEST, bare_feed_is_open, rotary_feed
 from toolpath_stiff.nc.codes.increments import ANGLES, assume_increments, increment
-from toolpath_stiff.nc.codes.motion import record
 from toolpath_stiff.nc.codes.points import LINEAR
 from toolpath_stiff.nc.codes.registry import CODES
 from toolpath_stiff.nc.frames import STILL
-from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Move, Moves
+from toolpath_stiff.nc.interpreter import suits
+from toolpath_stiff.nc.moves import ARC, FEED, RAPID, WIDE, Move, Moves
 from toolpath_stiff.nc.plain_words import BARE, FIRST_F, LAST_F, LETTERS, NO_CODE, NONE, PlainWords, lex
-from toolpath_stiff.nc.state import CurrentBlock, State
+from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
-from toolpath_stiff.nc.words import AXES, Block
+from toolpath_stiff.nc.words import AXES
 
 MODE_NAMES = tuple(name for name, code in CODES.items() if code.many)  # by the digit that `plain_words` reads
 MODES = {name: digit for digit, name in enumerate(MODE_NAMES)}
+OF_HOLE = ("start", "end", "motion", "feed", "dwell", "tool", "tool_length", "spindle", "from_machine")
 NO_MODE = -1
 CLOCKWISE = MODES["G2"]
-PLACES = {letter: axis for axis, letter in enumerate(AXES)}
 FEWEST = 8  # lines; below, one by one is as fast
 CHUNK = 8192  # lines: their words fit into a processor's cache
 
@@ -47,7 +47,7 @@ class PlainRun:
         self._pause = 0  # no other run is tried before this line
         self._start, self._words = -CHUNK, lex([""])[0]  # the chunk
         self._others = [0]  # its lines that are not plain, and its end
-        self._hole: tuple[int, int, object] | None = None  # the line tried last, the moves before it, and the state
+        self.hole: tuple[int, int, object] | None = None  # the line tried last, the moves before it, and the state
 
     def execute(self, first: int) -> PlainWords | None:
         """Execute plain lines from `first` (from 0); returns the words of those that were, None if there are none."""
@@ -56,7 +56,7 @@ class PlainRun:
             self._start, self._words = first, words
             self._others = [*(first + others).tolist(), first + len(words.code)]
         end = self._others[bisect_left(self._others, first)]
-        if end - first < FEWEST or first < self._pause or not _suits(self.state):
+        if end - first < FEWEST or first < self._pause or not suits(self.state):
             return None
         words = self._words.part(first - self._start, end - self._start)
         if self.state.motion in CYCLES or self.state.plain.modal:
@@ -72,63 +72,14 @@ class PlainRun:
         """Execute holes of a modal cycle from the second one that leaves the state as it was; returns their number."""
         state, recorder = self.state, self.state.recorder
         now = (state.motion, state.frames.position[2:], state.feed, state.spindle, {**state.sticky})
-        (line, before, was), self._hole = self._hole or (first, 0, None), (first + 1, len(recorder), now)
+        (line, before, was), self.hole = self.hole or (first, 0, None), (first + 1, len(recorder), now)
         hole = recorder.recent[before - recorder.packed :] if before >= recorder.packed else []
         if line != first or was != now or not hole or not state.absolute or state.plane != "G17":
             return 0
         there, level = hole[0].end[:2], hole[0].end[2:]
-        down = all(move.start[:2] == there == move.end[:2] and move.arc is None for move in hole[1:])
-        if not down or hole[0].arc is not None or hole[0].start[:2] == there or hole[0].start[2:] != level:
-            return 0
-        return Lines(state, words).drill(first, hole)
-
-
-def _suits(state: State) -> bool:
-    """True if the modes in force leave plain words their plain meaning."""
-    frames = state.frames
-    return (
-        state.feed_mode == "G94"
-        and state.polar is None
-        and state.unsettled is None
-        and state.corner is None
-        and state.cutter is None
-        and state.beside is None
-        and not state.height_lost
-        and not state.arc_absolute
-        and not frames.bound
-        and not frames.rotated
-    )
-
-
-def execute_straight(state: State, block: Block) -> bool:
-    """Execute a block that is a plain line of G0 or G1, perhaps with G90 or G91; False, with nothing done, if it is none."""
-    motion, feed, words, increments = state.motion, state.feed, dict[int, float](), state.dialect.increments
-    absolute, coded, fed, told = state.absolute, False, False, False
-    for letter, value, _, text in block.words:
-        if letter in PLACES:
-            axis = PLACES[letter]
-            if axis in words or abs(value) > LARGEST_MM or (increments and value and "." not in text):
-                return False
-            words[axis] = value if axis > 2 else value * state.length_scale
-        elif letter == "G" and not coded and value in (0.0, 1.0):
-            motion, coded = ("G0", "G1")[int(value)], True
-        elif letter == "G" and not told and value in (90.0, 91.0):
-            absolute, told = value == 90.0, True
-        elif letter == "F" and not fed:
-            feed, fed = value * state.feed_scale, True
-            if not SLOWEST <= feed <= LARGEST_WORD or ("." not in text and bare_feed_is_open(state)):
-                return False
-        else:
-            return False
-    if motion not in ("G0", "G1") or (motion == "G1" and feed is None) or not _suits(state):
-        return False
-    state.motion, state.feed, state.absolute, frames = motion, feed, absolute, state.frames
-    if words:
-        control = [*frames.position]
-        for axis, value in words.items():
-            control[axis] = frames.axis_to_control(axis, value) if absolute else control[axis] + value
-        record(state, CurrentBlock(state.name, block), RAPID if motion == "G0" else FEED, control, words)
-    return True
+        fits = all(move.start[:2] == there == move.end[:2] and move.arc is None for move in hole[1:])
+        fits &= hole[0].arc is None and hole[0].start[:2] != there and hole[0].start[2:] == level
+        return Lines(state, words).drill(first, hole) if fits else 0
 
 
 class Lines:
@@ -193,15 +144,13 @@ class Lines:
             there = frames.axis_to_control(axis, frames.axis_to_program(axis, control[:, axis]))
             self._stop((there != control[:, axis])[:-1] | (there != control[:, axis])[1:])
         n, k = self.end, len(hole)
-        start, end = (np.tile([getattr(move, name) for move in hole], (n, 1)) for name in ("start", "end"))
-        start[:, :2] = end[:, :2] = np.repeat(setup[1 : n + 1, :2], k, axis=0)
-        start[::k, :2] = setup[:n, :2]
-        names = ("motion", "feed", "dwell", "tool", "tool_length", "spindle")
-        columns = {name: np.tile([getattr(move, name) for move in hole], n) for name in names}
+        shape = {entry: (n, 1) if entry in WIDE else n for entry in OF_HOLE}
+        holes = {entry: np.tile([getattr(move, entry) for move in hole], shape[entry]) for entry in OF_HOLE}
+        holes["start"][:, :2] = holes["end"][:, :2] = np.repeat(setup[1 : n + 1, :2], k, axis=0)
+        holes["start"][::k, :2] = setup[:n, :2]
         line, nothing = np.repeat(np.arange(n) + (first + 1), k), np.zeros((n * k, 3))
-        still = np.zeros((n * k, 2), dtype=bool)
-        state.recorder.add_many(Moves(line, columns.pop("motion"), start, end, nothing[:, 0], nothing, nothing,
-            **columns, from_machine=still))
+        no_arc = {"arc_sweep": nothing[:, 0], "arc_center": nothing, "arc_normal": nothing}
+        state.recorder.add_many(Moves(line=line, **holes, **no_arc))
         self.mode, self.feed = np.full(self.n, NO_MODE), np.full(self.n, math.nan)
         return self._leave(control)
 

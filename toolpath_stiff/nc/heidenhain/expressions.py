@@ -142,7 +142,7 @@ class Formula(Scanner):
                 value = float(literal.replace(",", ".")) if literal else self.lookup(name, self.column)
                 if type(value) is not float:
                     return None
-                if operator == "*" or operator == "/":
+                if operator in ("*", "/"):
                     product = product * value if operator == "*" else product / value
                 else:
                     total, product = total + product, -value if operator == "-" else value

@@ -76,10 +76,9 @@ class ParametricRun(ProgramRun):
         return self._fail(self._at, f"{word.text} {problem}", expected, column=word.column)
 
     def _execute(self, block: Block) -> Then:
-        if self.family != NGC:  # LinuxCNC has no macro calls: refused when the codes are sorted
-            for place, word in enumerate(block.words):
-                if word.letter == "G" and code_name("G", word.value) in MACRO_CALLS:
-                    return self._macro_call(block, code_name("G", word.value), place)
+        for place, word in enumerate(block.words if self.family != NGC else ()):  # LinuxCNC's: refused when sorted
+            if word.letter == "G" and code_name("G", word.value) in MACRO_CALLS:
+                return self._macro_call(block, code_name("G", word.value), place)
         return self._act(block)
 
     def _act(self, block: Block) -> Then:
@@ -157,7 +156,7 @@ class ParametricRun(ProgramRun):
 
     def _ends_before(self, row: int) -> bool:
         """True if a line is the first of a file, so that the file before it has ended."""
-        return any(row == first for first, *_ in self._files)
+        return bool(self._files) and any(row == first for first, *_ in self._files)
 
     def _step(self, kind: str) -> Step | None:
         """Function that carries out a kind of steering block."""

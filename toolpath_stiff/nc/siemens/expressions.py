@@ -16,6 +16,8 @@ from toolpath_stiff.nc.heidenhain.expressions import COMMON, Formula, Value, sim
 from toolpath_stiff.nc.parametric.expressions import ARITHMETIC
 
 STRING = re.compile(r'"[^"]*"')
+ELEMENT = re.compile(r"\[[\d,]+\]")
+TIMES = re.compile(r"P(?=\s*[=\d(])")
 NAME = re.compile(r"\$?[A-Z_]\w*", re.ASCII)
 COMPARISONS: dict[str, Callable[[float, float], bool]] = {"<": lt, ">": gt, "<=": le, ">=": ge}
 LOGIC: dict[str, Callable[[bool, bool], bool]] = {
@@ -29,6 +31,11 @@ FUNCTIONS: dict[str, Callable[..., float]] = {
     "BOUND": lambda least, most, v: max(least, min(most, v)),
 }  # fmt: skip
 CONSTANTS: dict[str, Value] = {"TRUE": True, "FALSE": False, "$PI": math.pi}
+
+
+def array_of(name: str) -> str:
+    """The array to which an element belongs; for any other variable a name that no array has."""
+    return name.partition("[")[0] + "[]" if ELEMENT.search(name) else ""
 
 
 @dataclass
@@ -71,6 +78,15 @@ class SiemensScanner(Formula):
             parts.append(value)
         self.refuse_if(not self.sign("]"), "an index that is not closed", "]", column=column)
         return f"[{','.join(parts)}]"
+
+    def times(self) -> int:
+        """The number of runs: P after a call, or after a repeat."""
+        if not self.part(TIMES):
+            return 1
+        self.sign("=")
+        value = self.real()
+        self.refuse_if(value != int(value) or not 0 <= value <= 9999, f"P{value:g} repeats", "0 to 9999")
+        return int(value)
 
     def arguments(self, named: Container[int] = ()) -> list[Value | None]:
         """The values in the brackets that follow, separated by commas; None for an omitted one.

@@ -15,13 +15,13 @@ from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.parametric.run import ParametricRun, Step
 from toolpath_stiff.nc.parametric.statements import Statement, Steering
 from toolpath_stiff.nc.parametric.variables import Values
-from toolpath_stiff.nc.plain_lines import PlainRun, execute_straight
+from toolpath_stiff.nc.plain_lines import PlainRun
 from toolpath_stiff.nc.plain_words import PlainWords
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.run_records import Subprogram, Tally, beyond_the_end
-from toolpath_stiff.nc.siemens.blocks import carry_out, draw, sort_words
+from toolpath_stiff.nc.siemens.blocks import carry_out, draw, sort_words, straight
 from toolpath_stiff.nc.siemens.coordinates import bring_back, modes_of
-from toolpath_stiff.nc.siemens.expressions import NAME, SiemensScanner
+from toolpath_stiff.nc.siemens.expressions import NAME, SiemensScanner, array_of
 from toolpath_stiff.nc.siemens.programs import PROGRAM, heads_of, labels_of, plain_texts, programs_of
 from toolpath_stiff.nc.siemens.vocabulary import meaning_of
 from toolpath_stiff.nc.siemens.words import read_words, steering_of
@@ -34,18 +34,12 @@ OF_LATHES = re.compile(r"\bG(?:18|96)(?!\d)|\bLIMS\b|\bDIAM(?:ON|90)\b")
 ALONG_Y = re.compile(r"(?<![A-Z_$])Y\s*[-+=\d.]")
 IN_MACHINE = re.compile(r"\b(?:SUPA|G53|G153)\b")
 BY_TEXT, PATH = ("CALL", "EXTCALL"), re.compile(r"^(?:.*/)?(?:_N_)?|[._][SM]PF$")
-TIMES = re.compile(r"P(?=\s*[=\d(])")
 PARAMETER = re.compile(r"(VAR\s+)?(REAL|INT|BOOL)\s+(\w+)\s*(\[[^]]*\])?(?:\s*=\s*([^,)]+))?", re.ASCII)
-ELEMENT, INDEX = re.compile(r"\[[\d,]+\]"), re.compile(r"(?<=[\[,])[A-Z_]\w*(?=[\],])", re.ASCII)
+INDEX = re.compile(r"(?<=[\[,])[A-Z_]\w*(?=[\],])", re.ASCII)
 SECTION = re.compile(r"(REPEATB?)\s+(\w+)(?:\s+(?!P\s*=)(\w+))?", re.ASCII)
 END_OF_FILE, SUFFIXES = "%_N__END_SPF", (".SPF", ".MPF", "")
 SEARCHED = ("$P_SEARCH", "$P_SEARCHL", "$P_ISTEST", "$P_SIM", "$P_DRYRUN")
 RUNS = "the program runs from its beginning, not searched, tested or simulated ($P_SEARCH, $P_ISTEST, $P_SIM)"
-
-
-def _array(name: str) -> str:
-    """The array to which an element belongs; for any other variable a name that no array has."""
-    return name.partition("[")[0] + "[]" if ELEMENT.search(name) else ""
 
 
 class SiemensRun(ParametricRun):
@@ -148,7 +142,7 @@ class SiemensRun(ParametricRun):
     def _variable(self, name: str, column: int) -> Value:
         """The value of a variable; nan for a machine builder's one in a move in machine coordinates."""
         scope, name = self._scope(name)
-        value = scope.get(name, scope.get(_array(name)))
+        value = scope.get(name, scope.get(array_of(name)))
         if name in self._texts:
             return self._texts[name]
         if name in SEARCHED:
@@ -166,7 +160,7 @@ class SiemensRun(ParametricRun):
     def _define(self, name: str, value: Value, column: int, kind: str) -> None:
         """Set a variable; `kind`: its type if it is declared here."""
         scope, name = self._scope(name)
-        array = _array(name)
+        array = array_of(name)
         if not (kind or scope is self.variables.common or scope.keys() & {name, array} or name in self._texts):
             problem = f"{name} is no variable that is declared, and no address that is known"
             raise self._fail(self._at, problem, f"DEF REAL {name}, R parameters", column=column)
@@ -184,9 +178,7 @@ class SiemensRun(ParametricRun):
 
     def _execute(self, block: Block) -> Then:
         state, plain = self.state, self.state.plain
-        usual = self._plain is not None and not (plain.modal or plain.renumbered or self._tangent)
-        if usual and not any(word.letter in "ABC" for word in block.words) and execute_straight(state, block):
-            plain.heading = None
+        if self._plain is not None and not self._tangent and straight(state, block):
             return Flow.NEXT
         current = sort_words(state, block, self.tally)
         if "CYCLE72" in current.codes:
@@ -287,22 +279,13 @@ class SiemensRun(ParametricRun):
     def _until(self, row: int, steering: Steering) -> int | None:
         return None if self._value(steering) else self._structure.start[row] + 1
 
-    def _times(self, scanner: SiemensScanner) -> int:
-        """The number of runs: P after a call, or after a repeat."""
-        if not scanner.part(TIMES):
-            return 1
-        scanner.sign("=")
-        value = scanner.real()
-        scanner.refuse_if(value != int(value) or not 0 <= value <= 9999, f"P{value:g} repeats", "0 to 9999")
-        return int(value)
-
     def _section(self, row: int, steering: Steering) -> int | None:
         """REPEAT, REPEATB: run the blocks from a label on again."""
         scanner = self._scanner(row, self._begins[row].end())
         section = SECTION.match(scanner.text, scanner.position)
         assert section is not None
         scanner.position = section.end()
-        times = self._times(scanner)
+        times = scanner.times()
         scanner.refuse_if(not scanner.done, f"{scanner.rest()} behind {steering.shown}", "REPEAT LABEL P=2")
         if not times:
             return None
@@ -325,7 +308,7 @@ class SiemensRun(ParametricRun):
         heads = (PROGRAM.match(code_text(line)) for line in self.lines[first - 1 : first + 19])
         proc = next((head[3] for head in heads if head is not None and head[2]), "")
         level.arguments, level.references = self._bound(row, proc, scanner)
-        times = self._times(scanner)
+        times = scanner.times()
         scanner.refuse_if(not scanner.done, f"{scanner.rest()} behind the call of {name}", "a block of its own")
         level.again = times - 1
         if times:
