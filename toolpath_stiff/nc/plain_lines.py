@@ -149,8 +149,9 @@ class Lines:
         holes["start"][:, :2] = holes["end"][:, :2] = np.repeat(setup[1 : n + 1, :2], k, axis=0)
         holes["start"][::k, :2] = setup[:n, :2]
         line, nothing = np.repeat(np.arange(n) + (first + 1), k), np.zeros((n * k, 3))
-        no_arc = {"arc_sweep": nothing[:, 0], "arc_center": nothing, "arc_normal": nothing}
-        state.recorder.add_many(Moves(line=line, **holes, **no_arc))
+        state.recorder.add_many(
+            Moves(line=line, arc_sweep=nothing[:, 0], arc_center=nothing, arc_normal=nothing, **holes)
+        )
         self.mode, self.feed = np.full(self.n, NO_MODE), np.full(self.n, math.nan)
         return self._leave(control)
 
