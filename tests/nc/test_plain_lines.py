@@ -173,6 +173,14 @@ def test_inverse_time_and_inches():
     assert assert_same(lines) == 9  # those of G94
 
 
+@pytest.mark.parametrize("cycle", ["G81 G99", "G83 G98 Q1.5", "G82 G99 P0.2"])
+def test_holes_of_a_modal_cycle(cycle):
+    # Offsets whose sums round, a hole at the place before, one axis alone, another depth, and a step in between.
+    holes = [f"X{i * 0.37:.3f} Y{i % 7 / 3:.3f}" for i in range(40)]
+    lines = ["G21 G90 F300", "G10 L2 P1 X0.1 Y-0.3 Z0.7", "G0 X0 Y0 Z9", f"{cycle} X1 Y1 R2 Z-3.3", *holes, "Z-4"]
+    assert assert_same([*lines, *holes, "X5", "X5", *holes, "G91", *holes, "G80", "G0 Z9"]) > 60
+
+
 def moved_by_a_rule(*rule):
     """How the moves of both ways change when a rule of the interpreter does."""
     program = [

@@ -7,25 +7,77 @@ The meaning of each code is a function in `codes`, found in the table of `codes.
 from toolpath_stiff.nc.codes.code import Code, code_name
 from toolpath_stiff.nc.codes.cutter import check_block
 from toolpath_stiff.nc.codes.drilling import CYCLES, begin_cycle
+from toolpath_stiff.nc.codes.feeds import SLOWEST, bare_feed_is_open
 from toolpath_stiff.nc.codes.increments import increments_hint, read_numbers
-from toolpath_stiff.nc.codes.motion import homes_standing
+from toolpath_stiff.nc.codes.motion import homes_standing, record
 from toolpath_stiff.nc.codes.passive import m_parameters
 from toolpath_stiff.nc.codes.registry import CODES, REFUSED
 from toolpath_stiff.nc.codes.tools import list_numbers
 from toolpath_stiff.nc.geometry import ArcError
+from toolpath_stiff.nc.moves import FEED, RAPID
 from toolpath_stiff.nc.state import LAST_MODE, CurrentBlock, Flow, Group, State, Then
+from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
 from toolpath_stiff.nc.words import AXES, CORNERS, Block, Word
 
 NAMES = {"O": "program number", "$": "a setting of grbl or TinyG"}
 WORDS_THAT_ACT = ("F", "S", "T")
+PLACES = {letter: axis for axis, letter in enumerate(AXES)}
 TAKERS: tuple[Group, ...] = ("non-modal", "rotation", "tool length")  # groups whose codes may take the axis words
 
 
 def execute(state: State, block: Block) -> Then:
     """Execute a block; returns what runs after it. Raises `InputError` at a word, or at the block."""
-    if not block.words:
+    if not block.words or execute_straight(state, block):
         return Flow.NEXT
     return finish(state, begin(state, block))
+
+
+def suits(state: State) -> bool:
+    """True if the modes in force leave plain words their plain meaning."""
+    frames = state.frames
+    return (
+        state.feed_mode == "G94"
+        and state.polar is None
+        and state.unsettled is None
+        and state.corner is None
+        and state.cutter is None
+        and state.beside is None
+        and not state.height_lost
+        and not state.arc_absolute
+        and not frames.bound
+        and not frames.rotated
+    )
+
+
+def execute_straight(state: State, block: Block) -> bool:
+    """Execute a plain block of G0 or G1, perhaps with G90 or G91; False, with nothing done, for any other one."""
+    motion, feed, words, increments = state.motion, state.feed, dict[int, float](), state.dialect.increments
+    absolute, coded, fed, measured = state.absolute, False, False, False
+    for letter, value, _, text in block.words:
+        if letter in PLACES:
+            axis = PLACES[letter]
+            if axis in words or abs(value) > LARGEST_MM or (increments and value and "." not in text):
+                return False
+            words[axis] = value if axis > 2 else value * state.length_scale
+        elif letter == "G" and not coded and value in (0.0, 1.0):
+            motion, coded = ("G0", "G1")[int(value)], True
+        elif letter == "G" and not measured and value in (90.0, 91.0):
+            absolute, measured = value == 90.0, True
+        elif letter == "F" and not fed:
+            feed, fed = value * state.feed_scale, True
+            if not SLOWEST <= feed <= LARGEST_WORD or ("." not in text and bare_feed_is_open(state)):
+                return False
+        else:
+            return False
+    if motion not in ("G0", "G1") or (motion == "G1" and feed is None) or not suits(state):
+        return False
+    state.motion, state.feed, state.absolute, frames = motion, feed, absolute, state.frames
+    if words:
+        control = [*frames.position]
+        for axis, value in words.items():
+            control[axis] = frames.axis_to_control(axis, value) if absolute else control[axis] + value
+        record(state, CurrentBlock(state.name, block), RAPID if motion == "G0" else FEED, control, words)
+    return True
 
 
 def begin(state: State, block: Block) -> CurrentBlock:

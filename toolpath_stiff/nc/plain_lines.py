@@ -17,12 +17,14 @@ import numpy as np
 
 from toolpath_stiff.arrays import BoolArray, FloatArray, IntArray
 from toolpath_stiff.nc import geometry
+from toolpath_stiff.nc.codes.drilling import CYCLES
 from toolpath_stiff.nc.codes.feeds import SLOWEST, bare_feed_is_open, rotary_feed
 from toolpath_stiff.nc.codes.increments import ANGLES, assume_increments, increment
 from toolpath_stiff.nc.codes.points import LINEAR
 from toolpath_stiff.nc.codes.registry import CODES
 from toolpath_stiff.nc.frames import STILL
-from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Moves
+from toolpath_stiff.nc.interpreter import suits
+from toolpath_stiff.nc.moves import ARC, FEED, RAPID, WIDE, Move, Moves
 from toolpath_stiff.nc.plain_words import BARE, FIRST_F, LAST_F, LETTERS, NO_CODE, NONE, PlainWords, lex
 from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
@@ -30,6 +32,7 @@ from toolpath_stiff.nc.words import AXES
 
 MODE_NAMES = tuple(name for name, code in CODES.items() if code.many)  # by the digit that `plain_words` reads
 MODES = {name: digit for digit, name in enumerate(MODE_NAMES)}
+OF_HOLE = ("start", "end", "motion", "feed", "dwell", "tool", "tool_length", "spindle", "from_machine")
 NO_MODE = -1
 CLOCKWISE = MODES["G2"]
 FEWEST = 8  # lines; below, one by one is as fast
@@ -44,6 +47,7 @@ class PlainRun:
         self._pause = 0  # no other run is tried before this line
         self._start, self._words = -CHUNK, lex([""])[0]  # the chunk
         self._others = [0]  # its lines that are not plain, and its end
+        self.hole: tuple[int, int, object] | None = None  # the line tried last, the moves before it, and the state
 
     def execute(self, first: int) -> PlainWords | None:
         """Execute plain lines from `first` (from 0); returns the words of those that were, None if there are none."""
@@ -52,32 +56,30 @@ class PlainRun:
             self._start, self._words = first, words
             self._others = [*(first + others).tolist(), first + len(words.code)]
         end = self._others[bisect_left(self._others, first)]
-        if end - first < FEWEST or first < self._pause or not _suits(self.state):
+        if end - first < FEWEST or first < self._pause or not suits(self.state):
             return None
         words = self._words.part(first - self._start, end - self._start)
-        done = Lines(self.state, words).execute(first)
-        if done < FEWEST:
-            self._pause = first + done + 4 * FEWEST
+        if self.state.motion in CYCLES or self.state.plain.modal:
+            done = self._drill(first, words)
+        else:
+            done = Lines(self.state, words).execute(first)
+            self._pause = self._pause if done >= FEWEST else first + done + 4 * FEWEST
         if not done:
             return None
         return words.part(0, done)
 
-
-def _suits(state: State) -> bool:
-    """True if the modes in force leave plain words their plain meaning."""
-    frames = state.frames
-    return (
-        state.feed_mode == "G94"
-        and state.polar is None
-        and state.unsettled is None
-        and state.corner is None
-        and state.cutter is None
-        and state.beside is None
-        and not state.height_lost
-        and not state.arc_absolute
-        and not frames.bound
-        and not frames.rotated
-    )
+    def _drill(self, first: int, words: PlainWords) -> int:
+        """Execute holes of a modal cycle from the second one that leaves the state as it was; returns their number."""
+        state, recorder = self.state, self.state.recorder
+        now = (state.motion, state.frames.position[2:], state.feed, state.spindle, {**state.sticky})
+        (line, before, was), self.hole = self.hole or (first, 0, None), (first + 1, len(recorder), now)
+        hole = recorder.recent[before - recorder.packed :] if before >= recorder.packed else []
+        if line != first or was != now or not hole or not state.absolute or state.plane != "G17":
+            return 0
+        there, level = hole[0].end[:2], hole[0].end[2:]
+        fits = all(move.start[:2] == there == move.end[:2] and move.arc is None for move in hole[1:])
+        fits &= hole[0].arc is None and hole[0].start[:2] != there and hole[0].start[2:] == level
+        return Lines(state, words).drill(first, hole) if fits else 0
 
 
 class Lines:
@@ -127,6 +129,31 @@ class Lines:
         center, sweep = self._arcs(np.flatnonzero(arc[: self.end]), control)
         self._record(first, control, (center, sweep), moving)
         return self._leave(control if moving[: self.end].any() else None)
+
+    def drill(self, first: int, hole: Sequence[Move]) -> int:
+        """Drill at the points of the lines by the moves of the hole before; returns the number of lines executed."""
+        state, frames = self.state, self.state.frames
+        for key, form in self.words.forms.items():
+            self._stop((form != NONE) & (key not in ("X", "Y")))
+        other_mode = (self.words.code != NO_CODE) & (self.words.code != MODES.get(state.motion or "", NO_MODE))
+        control = self._control()
+        setup = control - np.array([*frames.fix_reference(), 0.0, 0.0, 0.0])
+        step, size = np.abs(np.diff(setup[:, :2], axis=0)), np.maximum(1.0, np.abs(setup[:-1, :2]))
+        self._stop(other_mode | (step == 0.0).all(axis=1) | ((step > 0.0) & (step < STILL * size)).any(axis=1))
+        for axis in range(6):  # elsewhere the frames' rounding adds up
+            there = frames.axis_to_control(axis, frames.axis_to_program(axis, control[:, axis]))
+            self._stop((there != control[:, axis])[:-1] | (there != control[:, axis])[1:])
+        n, k = self.end, len(hole)
+        shape = {entry: (n, 1) if entry in WIDE else n for entry in OF_HOLE}
+        holes = {entry: np.tile([getattr(move, entry) for move in hole], shape[entry]) for entry in OF_HOLE}
+        holes["start"][:, :2] = holes["end"][:, :2] = np.repeat(setup[1 : n + 1, :2], k, axis=0)
+        holes["start"][::k, :2] = setup[:n, :2]
+        line, nothing = np.repeat(np.arange(n) + (first + 1), k), np.zeros((n * k, 3))
+        state.recorder.add_many(
+            Moves(line=line, arc_sweep=nothing[:, 0], arc_center=nothing, arc_normal=nothing, **holes)
+        )
+        self.mode, self.feed = np.full(self.n, NO_MODE), np.full(self.n, math.nan)
+        return self._leave(control)
 
     def _record(self, first: int, control: FloatArray, arc: tuple[FloatArray, FloatArray], moving: BoolArray) -> None:
         """Record the moves of the executed lines, apart from those that go nowhere."""

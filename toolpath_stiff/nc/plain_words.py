@@ -92,7 +92,9 @@ def lex(lines: Sequence[str]) -> tuple[PlainWords, IntArray]:
     last = first + signed + pointed
     sign, point = marks.take(first + 1, mode="clip"), np.where(pointed, marks.take(last, mode="clip"), end)
     digits, decimals = end - begin - 1 - (last - first), end - point - pointed
-    rank = _ranks(codes[begin], kind)
+    rank = _RANKS[codes[begin]].astype(np.int64)
+    feeds = np.flatnonzero(rank == _FEED_RANK)  # in front if at most N and G stand before it
+    rank[feeds[(rank[feeds - 1] >= _FEED_RANK) & (kind[feeds - 1] == _LETTER)]] = KEYS.index(LAST_F)
     unsigned = (rank < _FEED_RANK + 1) | (rank >= len(KEYS) - 2)
     bad = (digits < 1) | (digits > MOST_DIGITS) | (unsigned & signed) | ((rank < _FEED_RANK) & pointed)
     bad |= (signed & (sign > begin + 1)) | (following > last + 1)  # signs misplaced, or too many
@@ -107,14 +109,6 @@ def lex(lines: Sequence[str]) -> tuple[PlainWords, IntArray]:
     kept = ~is_end & ~odd[line]
     form = np.where(pointed, np.where(decimals == 0, POINTED, BROKEN), BARE).astype(np.uint8)
     return _in_columns(len(lines), line[kept], rank[kept], value[kept], form[kept]), np.flatnonzero(odd)
-
-
-def _ranks(begins: ByteArray, kind: ByteArray) -> IntArray:
-    """Place in `KEYS` of each word; -1 for anything else. An F is in front if at most N and G stand before it."""
-    rank = _RANKS[begins].astype(np.int64)
-    feeds = np.flatnonzero(rank == _FEED_RANK)
-    rank[feeds[(rank[feeds - 1] >= _FEED_RANK) & (kind[feeds - 1] == _LETTER)]] = KEYS.index(LAST_F)
-    return rank
 
 
 def _values(buffer: bytes, point: IntArray, end: IntArray, digits: IntArray, decimals: IntArray) -> FloatArray:

@@ -9,8 +9,9 @@ call unchanged.
 import re
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from marshal import dumps
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes.registry import code_meaning
@@ -68,7 +69,7 @@ class ProgramRun:
         self.folder = None if request.controller.subprograms is None else Path(request.controller.subprograms)
         self._files: list[tuple[int, int, str]] = []
         self._main_lines = len(lines)
-        self._passes: dict[int, str] = {}  # line that jumps back -> the often-changing state, as it was there
+        self._passes: dict[int, bytes] = {}  # line that jumps back -> the often-changing state, as it was there
         self._moved = (0, 0)  # moves, and blocks run, at the last jump back after a move
 
     _at, _main_lines = 0, 1  # the line that runs, and how many lines the file itself has
@@ -132,6 +133,8 @@ class ProgramRun:
             if self.tally is None:
                 raise error from None
             self.tally.keep(error)
+            if self._plain is not None:  # what follows may have its error too
+                self._plain.hole = None
             return instead
 
     def _tally_plain(self, first: int, words: PlainWords) -> None:
@@ -188,12 +191,15 @@ class ProgramRun:
         if self._blocks > MOST_BLOCKS:
             raise self._fail(row, f"more than {MOST_BLOCKS:,} blocks have run", "fewer repeats, a loop that ends")
 
-    def _check_loop(self, row: int, to: int, changing: object) -> None:
+    def _check_loop(self, row: int, to: int, changing: Any) -> None:
         """At a jump back: refuse a loop in which nothing changes, or which makes no move in very many blocks."""
         moves = len(self.state.recorder)
         if moves != self._moved[0]:
             self._moved = (moves, self._blocks)
-        now = repr((self.state.frames, changing))
+        frames, table = self.state.frames, self.state.frames.offsets
+        offsets = [(offset.axes, offset.rotation) for offset in (*table.table, *table.additional.values())]
+        turns: Any = (frames.rotation, frames.linear, offsets, [(level.back, level.again) for level in self._levels])
+        now = dumps([frames.position, frames.g92, frames.active, frames.tool, turns, changing], 2)
         if now == self._passes.get(row) or self._blocks - self._moved[1] > MOST_IDLE:
             problem = f"the loop back to line {self._place(to).line} never ends"
             raise self._fail(row, f"{problem}: no variable or position changes, or nothing moves", "a loop that ends")

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from operator import truediv
 from typing import ClassVar
 
+from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.heidenhain.statements import NUMBER
 from toolpath_stiff.nc.parametric.expressions import ARITHMETIC, Scanner
 from toolpath_stiff.nc.place import Place
@@ -23,6 +24,7 @@ CONDITIONS = {"FN9": "EQU", "FN10": "NE", "FN11": "GT", "FN12": "LT"}
 EQUAL = 1e-9
 KNOWN = "numbers, Q parameters, functions, + - * / ^ ( )"
 Value = float | str  # a truth value is a bool, which is a number
+_TERM = re.compile(r"\s*([-+*/]?)\s*(?:([A-Z]\w*)|([\d.,]+))", re.ASCII)
 Lookup = Callable[[str, int], Value]  # the value of a variable, and the column where it stands
 LONGEST_BLOCK, MOST_BRACKETS = 512, 60  # characters (SIEMENS, Fundamentals, "Blocks and block format")
 
@@ -47,6 +49,11 @@ FUNCTIONS: dict[str, Callable[..., float]] = {
     **COMMON, "ATAN": lambda v: trimmed(math.degrees(math.atan(v))), "SQ": lambda v: v * v, "LOG": math.log10,
     "NEG": lambda v: -v, "INT": whole, "FRAC": lambda v: v - whole(v), "SGN": lambda v: float((v > 0) - (v < 0)),
 }  # fmt: skip
+
+
+def simple_pattern(part: str, others: str) -> re.Pattern[str]:
+    """Pattern of a sum of products of `part`, numbers and variables, that none of the other operators follows."""
+    return re.compile(rf"\s*[-+]?\s*{part}(?:\s*[-+*/]\s*{part})*(?!\s*(?:[-+*/(\[]|{others})|[\w.$])", re.ASCII)
 
 
 def assigned(head: str, rest: str, place: Place) -> tuple[str, str, Place]:
@@ -87,6 +94,9 @@ class Formula(Scanner):
         "ANG": lambda a, b: trimmed(math.degrees(math.atan2(a, b)) % 360.0),
     }  # fmt: skip
 
+    # A sum of products of numbers and variables, to its end.
+    simple: ClassVar = simple_pattern(rf"(?:{PARAMETER.pattern}|{NUMBER})", r"[,^]|DIV|LEN|ANG")
+
     def __post_init__(self) -> None:
         problem = f"a block of {len(self.text)} characters, or with too many brackets"
         long = len(self.text) > LONGEST_BLOCK or self.text.count("(") > MOST_BRACKETS
@@ -111,6 +121,10 @@ class Formula(Scanner):
 
     def result(self, tightest: int = 0) -> Value:
         """Value of operands and operators that bind tighter than `tightest`."""
+        simple = self.simple.match(self.text, self.position) if tightest < self.ranks["+"] else None
+        if simple is not None and (known := self._sum(simple[0])) is not None:
+            self.position = simple.end()
+            return known
         left = self.operand()
         while True:
             begin = self.position
@@ -119,6 +133,23 @@ class Formula(Scanner):
                 self.position = begin
                 return left
             left = self.operated(operator, left, self.result(self.ranks[operator]), self.column_of(begin))
+
+    def _sum(self, text: str) -> float | None:
+        """Value of an expression that `simple` matches; None: for `result`, which has its errors."""
+        total = product = -0.0  # which changes no number that it is added to
+        try:
+            for operator, name, literal in _TERM.findall(text):
+                value = float(literal.replace(",", ".")) if literal else self.lookup(name, self.column)
+                if type(value) is not float:
+                    return None
+                if operator in ("*", "/"):
+                    product = product * value if operator == "*" else product / value
+                else:
+                    total, product = total + product, -value if operator == "-" else value
+        except (ArithmeticError, InputError):
+            return None
+        total += product
+        return total if math.isfinite(total) else None
 
     def real(self) -> float:
         """A number. Raises `InputError` if the value is none."""

@@ -76,11 +76,10 @@ class ParametricRun(ProgramRun):
         return self._fail(self._at, f"{word.text} {problem}", expected, column=word.column)
 
     def _execute(self, block: Block) -> Then:
-        codes = [code_name("G", word.value) if word.letter == "G" else "" for word in block.words]
-        place = next((index for index, code in enumerate(codes) if code in MACRO_CALLS), None)
-        if place is None or self.family == NGC:  # LinuxCNC has none: refused when the codes are sorted
-            return self._act(block)
-        return self._macro_call(block, codes[place], place)
+        for place, word in enumerate(block.words if self.family != NGC else ()):  # LinuxCNC's: refused when sorted
+            if word.letter == "G" and code_name("G", word.value) in MACRO_CALLS:
+                return self._macro_call(block, code_name("G", word.value), place)
+        return self._act(block)
 
     def _act(self, block: Block) -> Then:
         """Carry out a block; after a move comes the call of G66."""
@@ -152,12 +151,12 @@ class ParametricRun(ProgramRun):
         to = act(self, row, steering) if act else None
         if to is not None and to <= row and len(self._levels) == depth:  # otherwise a call, or its end
             variables = self.variables
-            self._check_loop(row, to, (variables.levels, variables.common, self._repeats, self._levels))
+            self._check_loop(row, to, (variables.levels, variables.common, self._repeats))
         return row + 1 if to is None else self._jump(row, to)
 
     def _ends_before(self, row: int) -> bool:
         """True if a line is the first of a file, so that the file before it has ended."""
-        return any(row == first for first, *_ in self._files)
+        return bool(self._files) and any(row == first for first, *_ in self._files)
 
     def _step(self, kind: str) -> Step | None:
         """Function that carries out a kind of steering block."""

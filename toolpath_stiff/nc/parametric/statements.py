@@ -6,7 +6,7 @@ A block is read once, to a `Statement`; running it works out its values.
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 
 from toolpath_stiff.nc.controller import Dialect
@@ -217,15 +217,15 @@ def worked_out(statement: Statement, variables: Variables, place: Place) -> Bloc
     """Block with the values of its words; a word with an empty variable counts as absent (Macro B)."""
     if not statement.computed:
         return statement.block
-    words = []
-    for index, word in enumerate(statement.block.words):
+    block, words = statement.block, []
+    for index, word in enumerate(block.words):
         if index not in statement.computed:
             words.append(word)
             continue
         value = statement.computed[index](variables)
         if value is not None:
             words.append(_computed_word(word, _whole(word, value, place) if word.letter in WHOLE_WORDS else value))
-    return replace(statement.block, words=tuple(words))
+    return Block(block.line, tuple(words), block.optional, block.percent, block.switch)
 
 
 def _whole(word: Word, value: float, place: Place) -> float:

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from toolpath_stiff.nc.codes.code import code_name
 from toolpath_stiff.nc.elements import Element
 from toolpath_stiff.nc.heidenhain.drawing import drawing, elements_of
+from toolpath_stiff.nc.interpreter import execute_straight
 from toolpath_stiff.nc.run_records import Tally
 from toolpath_stiff.nc.siemens.cycles import repeated
 from toolpath_stiff.nc.siemens.motion import move, moves, round_all
@@ -16,6 +17,15 @@ SINGLE = ("motion", "distance", "plane", "cutter compensation", "work offset", "
 BETWEEN = frozenset((*SINGLE[:2], "F", "S", "look-ahead", "M coolant", "M stop"))  # the moves of a corner
 SETS = frozenset(("F", "S", "G0", "G1"))
 OTHER_NUMBERS = {"G4", "G25", "G26"}  # beside these, F and S are no feed and no speed
+
+
+def straight(state: State, block: Block) -> bool:
+    """Execute a plain block of G0 or G1 that no CT follows; False, with nothing done, for any other one."""
+    plain, turns = state.plain, any(word.letter in "ABC" for word in block.words)
+    if plain.modal or plain.renumbered or turns or not execute_straight(state, block):
+        return False
+    plain.heading = None
+    return True
 
 
 def sort_words(state: State, block: Block, tally: Tally | None) -> CurrentBlock:

@@ -12,10 +12,12 @@ from dataclasses import dataclass
 from operator import ge, gt, le, lt
 from typing import ClassVar
 
-from toolpath_stiff.nc.heidenhain.expressions import COMMON, Formula, Value, whole
+from toolpath_stiff.nc.heidenhain.expressions import COMMON, Formula, Value, simple_pattern, whole
 from toolpath_stiff.nc.parametric.expressions import ARITHMETIC
 
 STRING = re.compile(r'"[^"]*"')
+ELEMENT = re.compile(r"\[[\d,]+\]")
+TIMES = re.compile(r"P(?=\s*[=\d(])")
 NAME = re.compile(r"\$?[A-Z_]\w*", re.ASCII)
 # Of the machine: outputs, data of the PLC, timers; group 1: what keeps its value.
 SET_HERE = re.compile(r"\$A_(?:OUTA?|DB[BWDR])\[|\$AC_(MARKER|PARAM)\[|\$AC_TIMER\[")
@@ -33,12 +35,18 @@ FUNCTIONS: dict[str, Callable[..., float]] = {
 CONSTANTS: dict[str, Value] = {"TRUE": True, "FALSE": False, "$PI": math.pi}
 
 
+def array_of(name: str) -> str:
+    """The array to which an element belongs; for any other variable a name that no array has."""
+    return name.partition("[")[0] + "[]" if ELEMENT.search(name) else ""
+
+
 @dataclass
 class SiemensScanner(Formula):
     """Scanner of a block in Siemens' language."""
 
     literal: ClassVar = re.compile(r"(?:\d++\.?\d*|\.\d+)(?:EX[+-]?\d+)?", re.ASCII)
     operator: ClassVar = re.compile(r"<<|<>|<=|>=|==|[-+*/<>]|(?:DIV|MOD|AND|XOR|OR)\b")
+    simple: ClassVar = simple_pattern(r"(?:[A-Z_]\w*|\d+\.?\d*|\.\d+)", r"[<>=]|(?:DIV|MOD|AND|XOR|OR)\b")
     name: ClassVar = re.compile(rf'"|{NAME.pattern}', re.ASCII)
     ranks: ClassVar = {
         **dict.fromkeys((*COMPARISONS, "==", "<>"), 1), "<<": 2, "OR": 3, "XOR": 4, "AND": 5, "+": 6, "-": 6,
@@ -72,6 +80,15 @@ class SiemensScanner(Formula):
             parts.append(value)
         self.refuse_if(not self.sign("]"), "an index that is not closed", "]", column=column)
         return f"[{','.join(parts)}]"
+
+    def times(self) -> int:
+        """The number of runs: P after a call, or after a repeat."""
+        if not self.part(TIMES):
+            return 1
+        self.sign("=")
+        value = self.real()
+        self.refuse_if(value != int(value) or not 0 <= value <= 9999, f"P{value:g} repeats", "0 to 9999")
+        return int(value)
 
     def arguments(self, named: Container[int] = ()) -> list[Value | None]:
         """The values in the brackets that follow, separated by commas; None for an omitted one.

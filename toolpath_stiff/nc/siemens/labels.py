@@ -11,7 +11,6 @@ from toolpath_stiff.nc.run_records import Subprogram
 from toolpath_stiff.nc.siemens.expressions import SiemensScanner
 from toolpath_stiff.nc.siemens.words import chosen
 
-TIMES = re.compile(r"P(?=\s*[=\d(])")
 SECTION = re.compile(r"(REPEATB?)\s+(\w+)(?:\s+(?!P\s*=)(\w+))?", re.ASCII)
 
 
@@ -48,22 +47,13 @@ class LabelRun(ParametricRun):
         way = chosen(self._scanner(row, self._begins[row].end()))
         return self._to_label(row, *way) if way else None
 
-    def _times(self, scanner: SiemensScanner) -> int:
-        """The number of runs: P after a call, or after a repeat."""
-        if not scanner.part(TIMES):
-            return 1
-        scanner.sign("=")
-        value = scanner.real()
-        scanner.refuse_if(value != int(value) or not 0 <= value <= 9999, f"P{value:g} repeats", "0 to 9999")
-        return int(value)
-
     def _section(self, row: int, steering: Steering) -> int | None:
         """REPEAT, REPEATB: run the blocks from a label on again."""
         scanner = self._scanner(row, self._begins[row].end())
         section = SECTION.match(scanner.text, scanner.position)
         assert section is not None
         scanner.position = section.end()
-        times = self._times(scanner)
+        times = scanner.times()
         scanner.refuse_if(not scanner.done, f"{scanner.rest()} behind {steering.shown}", "REPEAT LABEL P=2")
         if not times:
             return None

@@ -19,10 +19,10 @@ from toolpath_stiff.nc.plain_lines import PlainRun
 from toolpath_stiff.nc.plain_words import PlainWords
 from toolpath_stiff.nc.request import Request
 from toolpath_stiff.nc.run_records import Subprogram, Tally, beyond_the_end
-from toolpath_stiff.nc.siemens.blocks import carry_out, draw, sort_words
+from toolpath_stiff.nc.siemens.blocks import carry_out, draw, sort_words, straight
 from toolpath_stiff.nc.siemens.contours import contour_ends
 from toolpath_stiff.nc.siemens.coordinates import bring_back, modes_of
-from toolpath_stiff.nc.siemens.expressions import NAME, SET_HERE, SiemensScanner
+from toolpath_stiff.nc.siemens.expressions import NAME, SET_HERE, SiemensScanner, array_of
 from toolpath_stiff.nc.siemens.labels import LabelRun
 from toolpath_stiff.nc.siemens.programs import PROGRAM, heads_of, labels_of, plain_texts, programs_of
 from toolpath_stiff.nc.siemens.tools import set_data
@@ -38,15 +38,10 @@ ALONG_Y = re.compile(r"(?<![A-Z_$])Y\s*[-+=\d.]")
 IN_MACHINE = re.compile(r"\b(?:SUPA|G53|G153)\b")
 BY_TEXT, PATH = ("CALL", "EXTCALL"), re.compile(r"^(?:.*/)?(?:_N_)?|[._][SM]PF$")
 PARAMETER = re.compile(r"(VAR\s+)?(REAL|INT|BOOL)\s+(\w+)\s*(\[[^]]*\])?(?:\s*=\s*([^,)]+))?", re.ASCII)
-ELEMENT, INDEX = re.compile(r"\[[\d,]+\]"), re.compile(r"(?<=[\[,])[A-Z_]\w*(?=[\],])", re.ASCII)
+INDEX = re.compile(r"(?<=[\[,])[A-Z_]\w*(?=[\],])", re.ASCII)
 END_OF_FILE, SUFFIXES = "%_N__END_SPF", (".SPF", ".MPF", "")
 SEARCHED = ("$P_SEARCH", "$P_SEARCHL", "$P_ISTEST", "$P_SIM", "$P_DRYRUN")
 RUNS = "the program runs from its beginning, not searched, tested or simulated ($P_SEARCH, $P_ISTEST, $P_SIM)"
-
-
-def _array(name: str) -> str:
-    """The array to which an element belongs; for any other variable a name that no array has."""
-    return name.partition("[")[0] + "[]" if ELEMENT.search(name) else ""
 
 
 class SiemensRun(LabelRun):
@@ -75,6 +70,7 @@ class SiemensRun(LabelRun):
         self._labels, self._subs = labels_of(self._begins), programs_of(self._begins)
         begins = {row for row in self._subs.values() if any(code_text(text).strip() for text in self.lines[:row])}
         self._ends = begins | {row for row, text in enumerate(self.lines) if text == END_OF_FILE}
+        self._tangent = any(re.search(r"\bCT\b", begin.string) for begin in self._begins)  # needs directions
         self._plain = self._lexer = PlainRun(self.state, plain_texts(self.lines, self._begins), self.name)
 
     def run(self) -> list[Remark]:
@@ -116,12 +112,17 @@ class SiemensRun(LabelRun):
 
     def _read(self, row: int) -> Block:
         statement, code = self._statement(row), self._begins[row].string
+        self._homes = IN_MACHINE.search(code) is not None
+        if row in self._called:
+            return self._called[row]
         line = row + 1 if row < self._main_lines else self._line_of_call()
         if self._is_head(row):
             return Block(line, ())
-        self._homes = IN_MACHINE.search(code) is not None
         words = read_words(self._scanner(row, self._begins[row].end()), self._define)
-        return Block(line, tuple(words), statement.block.optional, switch=statement.block.switch)
+        block = Block(line, tuple(words), statement.block.optional, switch=statement.block.switch)
+        if row < self._main_lines and self._lexer.lines[row] != "?":
+            self._called[row] = block
+        return block
 
     # Variables
 
@@ -145,7 +146,7 @@ class SiemensRun(LabelRun):
     def _variable(self, name: str, column: int) -> Value:
         """The value of a variable; nan for a machine builder's one in a move in machine coordinates."""
         scope, name = self._scope(name)
-        value = scope.get(name, scope.get(_array(name)))
+        value = scope.get(name, scope.get(array_of(name)))
         if name in self._texts:
             return self._texts[name]
         if name == "$P_TOOLR" and not math.isnan(self.state.plain.radius):
@@ -167,7 +168,7 @@ class SiemensRun(LabelRun):
         scope, name = self._scope(name)
         if not isinstance(value, str) and set_data(self.state, name, value):
             return
-        array, machine = _array(name), SET_HERE.match(name)
+        array, machine = array_of(name), SET_HERE.match(name)
         if machine is not None:
             value = value if machine[1] else math.nan
         elif not (kind or scope is self.variables.common or scope.keys() & {name, array} or name in self._texts):
@@ -187,6 +188,8 @@ class SiemensRun(LabelRun):
 
     def _execute(self, block: Block) -> Then:
         state, plain = self.state, self.state.plain
+        if self._plain is not None and not self._tangent and straight(state, block):
+            return Flow.NEXT
         current = sort_words(state, block, self.tally)
         if "CYCLE62" in current.codes:
             self._calls = [*self._calls * (not self._milled), self._contour_rows(current)]
@@ -195,7 +198,7 @@ class SiemensRun(LabelRun):
             plain.contour = draw(state, current, self._contour(current))
         with current.placing():
             carry_out(state, current)
-        slow = plain.modal or plain.held or plain.side or plain.unknown or plain.transformed or plain.base == "machine"
+        slow = plain.held or plain.side or plain.unknown or plain.transformed or plain.base == "machine"
         slow = slow or plain.rounding > 0.0
         self._plain = None if slow or (plain.renumbered and not state.absolute) else self._lexer
         called = any(level.stop < 0 for level in self._levels)
@@ -287,7 +290,7 @@ class SiemensRun(LabelRun):
         heads = (PROGRAM.match(code_text(line)) for line in self.lines[first - 1 : first + 19])
         proc = next((head[3] for head in heads if head is not None and head[2]), "")
         level.arguments, level.references = self._bound(row, proc, scanner)
-        times = self._times(scanner)
+        times = scanner.times()
         scanner.refuse_if(not scanner.done, f"{scanner.rest()} behind the call of {name}", "a block of its own")
         level.again = times - 1
         if times:
