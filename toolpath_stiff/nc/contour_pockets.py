@@ -4,11 +4,13 @@ How a control clears an area is not published: rings parallel to the contours, f
 differ from arcs by at most `FLAT_MM`.
 """
 
+import cmath
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 
 import shapely
+from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
 from toolpath_stiff.nc.elements import Contour, Element, direction, swept
@@ -26,8 +28,7 @@ def line_along(path: Sequence[Element]) -> shapely.LineString:
         if center is not None and abs(start - center) > FLAT_MM:
             sweep = swept((start, end, center, turn))
             count = math.ceil(abs(sweep) / (2.0 * math.acos(1.0 - FLAT_MM / abs(start - center))))
-            points += [center + (start - center) * complex(math.cos(a), math.sin(a)) for a in
-                       (sweep * index / count for index in range(1, count))]  # fmt: skip
+            points += [center + (start - center) * cmath.rect(1.0, sweep * i / count) for i in range(1, count)]
         points.append(end)
     return _line(points)
 
@@ -41,7 +42,7 @@ def orientation(contour: Contour) -> int:
     return 1 if shapely.LinearRing(line_along(contour)).is_ccw else -1
 
 
-def area_of(pockets: list[Contour], islands: list[Contour]) -> shapely.Polygon:
+def area_of(pockets: list[Contour], islands: list[Contour]) -> BaseGeometry:
     """The area that closed pockets enclose without their islands. Raises `ArcError` where that is not clear."""
     outer, inner = ([shapely.Polygon(line_along(contour)) for contour in part] for part in (pockets, islands))
     crossed = not all(shape.is_valid for shape in (*outer, *inner))
@@ -52,7 +53,7 @@ def area_of(pockets: list[Contour], islands: list[Contour]) -> shapely.Polygon:
     return area.difference(shapely.union_all(inner))
 
 
-def left_by(area: shapely.Polygon, coarse: float, radius: float, spare: float) -> shapely.Polygon:
+def left_by(area: BaseGeometry, coarse: float, radius: float, spare: float) -> BaseGeometry:
     """The area for a tool that mills, up to an allowance, what one of the radius `coarse` could not reach in it."""
     rough = area.buffer(-spare, QUARTER)
     left = rough.difference(rough.buffer(-coarse, QUARTER).buffer(coarse + NEAR_MM, QUARTER))
@@ -61,7 +62,7 @@ def left_by(area: shapely.Polygon, coarse: float, radius: float, spare: float) -
     )
 
 
-def walls_within(area: shapely.Polygon, walls: list[Contour], apart: float, turn: int) -> list[Contour]:
+def walls_within(area: BaseGeometry, walls: list[Contour], apart: float, turn: int) -> list[Contour]:
     """Paths beside the edges of an area if the tool fits along all of them, else round what it can reach."""
     room = area.buffer(NEAR_MM - apart, QUARTER)
     if walls and all(room.covers(line_along(wall)) for wall in walls):
@@ -70,7 +71,7 @@ def walls_within(area: shapely.Polygon, walls: list[Contour], apart: float, turn
     return list(_edges(area.buffer(-apart, fine), turn))
 
 
-def _edges(area: shapely.Polygon, turn: int) -> Iterator[Contour]:
+def _edges(area: BaseGeometry, turn: int) -> Iterator[Contour]:
     """Edges of an area, its outer ones counter-clockwise where `turn` is +1, and around its holes the other way."""
     for part in shapely.get_parts(area) if not area.is_empty else ():
         shape = orient(part, turn)
@@ -78,7 +79,7 @@ def _edges(area: shapely.Polygon, turn: int) -> Iterator[Contour]:
             yield [(complex(*a), complex(*b), None, 0) for a, b in pairwise(ring.coords)]
 
 
-def lead_within(room: shapely.Polygon, path: Contour, free: int, most: float) -> float:
+def lead_within(room: BaseGeometry, path: Contour, free: int, most: float) -> float:
     """Radius of the quarter circles on which `pockets.along` meets a closed path: the largest that has room, or 0."""
     begin, ahead, way = path[0][0], direction(path[0], path[0][0]), room.buffer(NEAR_MM)
     for size in (most, most / 2.0, most / 4.0):
@@ -90,7 +91,7 @@ def lead_within(room: shapely.Polygon, path: Contour, free: int, most: float) ->
 
 
 def clear_area(
-    room: shapely.Polygon, walls: list[Contour], step: float, heights: Heights, feeds: Feeds, turn: int, top: float
+    room: BaseGeometry, walls: list[Contour], step: float, heights: Heights, feeds: Feeds, turn: int, top: float
 ) -> Iterator[Cut]:
     """Clear layer by layer from the `top` of the work: rings a step apart from the inside out, last the room's walls.
 
