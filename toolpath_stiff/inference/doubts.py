@@ -72,20 +72,15 @@ def noise_doubt(problem: Problem, noise: Noise, gate: Gate, verdict: str, seed: 
         factor *= float(np.sqrt(gate.squares / np.median(gate.simulated)))
         if not 1.0 < factor < LARGEST_FACTOR:
             return "", 1.0
-        gate = _gate_at(problem, noise, factor, seed)
+        larger = noise.times(factor)
+        scaled = Problem.of(problem.predictor, larger)
+        gate = gate_of(scaled, larger, scaled.score_base(), seed)
     if gate.probability <= ENOUGH:
         return "", 1.0
     return (
         f"the stated noise of {size:.2g} % may be too small: were it {factor:.2g} times as large, {factor * size:.2g} "
         "%, the model alone would explain the readings; repeat a few readings, re-clamped, and leave it to them"
     ), factor
-
-
-def _gate_at(problem: Problem, noise: Noise, factor: float, seed: int) -> Gate:
-    """Absolute test of the model alone under `factor` times the noise."""
-    larger = noise.times(factor)
-    scaled = Problem.of(problem.predictor, larger)
-    return gate_of(scaled, larger, scaled.score_base(), seed)
 
 
 def gate_of(problem: Problem, noise: Noise, fit: Fit, seed: int) -> Gate:

@@ -95,7 +95,7 @@ class SizePrior:
         if longest >= VISIBLE:  # otherwise no size is visible and all are alike
             for sign, length in lengths.items():
                 density[sign] = density[sign] - 0.5 * (np.maximum(VISIBLE - length, 0.0) / FADES) ** 2
-        mass = max(sum(_trapezoid(np.exp(density[sign]), logs[sign]) for sign in logs), 1e-300)
+        mass = max(sum(float(np.trapezoid(np.exp(density[sign]), logs[sign])) for sign in logs), 1e-300)
         return cls(logs, {sign: density[sign] - np.log(mass) for sign in logs})
 
     def log_at(self, sizes: FloatArray) -> FloatArray:
@@ -116,16 +116,12 @@ class SizePrior:
             nodes = np.unique(np.concatenate([logs, np.log(fine[inside])]))
             likelihood = np.exp(-0.5 * ((sign * np.exp(nodes) - peak) / sd) ** 2)
             values = np.exp(np.interp(nodes, logs, self.log_density[sign])) * likelihood
-            total += _trapezoid(values, nodes)
+            total += float(np.trapezoid(values, nodes))
         return float(np.log(max(total, 1e-300)))
 
     def log_density_around(self, size: float, sd: float) -> float:
         """Log density at a size, or at its standard deviation `sd` if that is larger."""
         return float(max(self.log_at(np.array([np.sign(size) * max(abs(size), sd)]))[0], -60.0))
-
-
-def _trapezoid(values: FloatArray, x: FloatArray) -> float:
-    return float((0.5 * (values[1:] + values[:-1]) * np.diff(x)).sum())
 
 
 def _sizes(table: CandidateTable, j: int, sign: float, sight: Sight) -> FloatArray:
