@@ -73,6 +73,7 @@ class ProgramRun:
         self._moved = (0, 0)  # moves, and blocks run, at the last jump back after a move
 
     _at, _main_lines = 0, 1  # the line that runs, and how many lines the file itself has
+    _plain: PlainRun | None = None
     meaning = staticmethod(code_meaning)  # the meaning of a code, or of a word of the language
     cuts_by = "a feed move (G1, G2, G3 or a cycle)"
 
