@@ -273,6 +273,7 @@ REFUSALS = {
     "FUNCTION MODE TURN": ("turning is not supported", 3),
     "L X+10\nRND R2 X+3\nL Y+10": ("X.3 is no word of RND", 4),
     "CYCL DEF 9.1 V.ZEIT": ("needs its time", 3),
+    "FUNCTION DWELL REV5.8": ("FUNCTION DWELL REV is no statement that is known", 3),
     "Q = 5": ("Q is no statement that is known", 3),
     "Q1 = 3 / 0": ("cannot be worked out", 3),
     "Q1 = ((3": ("3:7: a bracket that is not closed", 3),

@@ -125,8 +125,8 @@ def _axis(state: State) -> Vector:
 
 
 def dwell(state: State, block: CurrentBlock, code: str) -> None:
-    """CYCL DEF 9.1: a pause in seconds."""
-    state.pause(block, "", block.take("#"), "CYCL DEF 9.1 DWELL 1.5")
+    """CYCL DEF 9.1, FUNCTION DWELL TIME: a pause in seconds."""
+    state.pause(block, "", block.take("#"), f"{code} 1.5")
 
 
 def units(state: State, block: CurrentBlock, code: str) -> None:

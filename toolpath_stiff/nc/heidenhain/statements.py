@@ -21,7 +21,7 @@ _BEGIN = re.compile(r"\s*(/?)\s*(?:N?\d+(?![\d.,])\s*)?(/?)\s*", re.IGNORECASE)
 _COMMENT = re.compile(r'"[^"]*"|;.*')
 _HEAD = re.compile(
     r"(?:BEGIN|END)\s+PGM|BLK\s+FORM(?:\s+(?:0[.,][12]|[A-Z]+))?|TOOL\s+(?:CALL|DEF)|CYCL\s+DEF\s*\d+(?:\s*[.,]\d+)?"
-    r"|CYCL\s+CALL(?:\s+P[OA][ST]\b)?|CALL\s+(?:LBL|PGM)|FN\s*\d+\s*:|FUNCTION\s+(?:RESET\s+)?[A-Z]+|PLANE\s+[A-Z]+"
+    r"|CYCL\s+CALL(?:\s+P[OA][ST]\b)?|CALL\s+(?:LBL|PGM)|FN\s*\d+\s*:|FUNCTION\s+(?:RESET\s+|DWELL\s+)?[A-Z]+|PLANE\s+[A-Z]+"
     r"|(?:APPR|DEP)\s+[A-Z]+|TCH\s+PROBE(?:\s+\d+)?|(?:SEL|PATTERN|INIT)\s+[A-Z]+|Q[LRS]?\d+(?=\s*=)|DECLARE\s+STRING"
     r"|TRANS\s+DATUM(?:\s+(?:AXIS|RESET))?|[A-Z]+"
 )
@@ -38,7 +38,7 @@ _LABEL = re.compile(r'\s*/?\s*(?:N?\d+\s+)?/?\s*LBL\s*(?:0*(\d+)|"([^"]*)")\s*$'
 PARAMETER = re.compile(r"\s*\bQ\d+\s*(?:=|F?AUTO|F?MAX)", re.IGNORECASE)
 _INCH = re.compile(r"\b(INCH)()()\s*$")
 _NUMBERS = re.compile(rf"(DR[+-]|(?<![A-Z])[FXY]|)(?:(?<=DR[+-])()|\s*({VALUE}))")  # behind names in any language
-_OLD = re.compile(r"CYCL DEF (?:9\.1|(?:1|2|4|5|17)\.[1-6])")
+_OLD = re.compile(r"CYCL DEF (?:9\.1|(?:1|2|4|5|17)\.[1-6])|FUNCTION DWELL TIME")
 _VALUES = {"MAX": MAX, "FMAX": MAX, "AUTO": AUTO, "FAUTO": AUTO}
 # Heads whose rest has another form, or is irrelevant.
 _OTHERWISE = re.compile(

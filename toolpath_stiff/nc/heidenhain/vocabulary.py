@@ -110,7 +110,7 @@ _ROWS: Rows = (
     )),
     ("motion", _SPECIAL, (("CYCL DEF 300", functions.left_out, "300 to 399: the machine builder's, left out"),)),
     ("motion", f"{_CYCLES}, Touch probe cycles", (("TCH PROBE", functions.left_out, "probing, left out"),)),
-    ("dwell", _SPECIAL, (("CYCL DEF 9.1", functions.dwell, "dwell"),)),
+    ("dwell", _SPECIAL, (("CYCL DEF 9.1|FUNCTION DWELL TIME", functions.dwell, "dwell"),)),
     ("path control", _SPECIAL, (
         (f"CYCL DEF 9.0|{_parts(13, 0, 1)}|{_parts(32, 0, 3)}", _LISTED,
          "dwell, spindle angle, tolerance: changes no path"),
