@@ -120,13 +120,19 @@ def test_what_the_form_of_an_instruments_error_leaves_is_none_of_the_machines():
     assert not updated(even, "weak_strut", "gauge_scale:direction=Y").rises
 
 
-def test_what_leaves_a_pattern_that_no_noise_makes_is_not_written():
+def test_what_leaves_a_pattern_that_no_noise_makes_is_not_written_unless_named():
     """A weak strut, and every other pose 12 % softer: the strut lowers the error, and explains half of it."""
     data = readings(active("weak_strut", {"strut": 3}, factor=0.5), draw=as_written)
     odd = np.unique(data.point, return_inverse=True)[1] % 2
-    found = updated(replace(data, stiffness=data.stiffness * (1.0 - 0.12 * odd)), "weak_strut", believe=MACHINE)
-    assert all(support.supported for support in found.supports) and not found.accepted
-    assert any("the readings are not explained by weak_strut" in clause for clause in found.rises)
+    patterned, clause = (
+        replace(data, stiffness=data.stiffness * (1.0 - 0.12 * odd)),
+        "the readings are not explained by",
+    )
+    by_itself = updated(patterned, auto=True, believe=MACHINE)
+    assert "weak_strut" in by_itself.added and not by_itself.accepted
+    assert any(clause in sentence for sentence in by_itself.rises)
+    named = updated(patterned, "weak_strut", believe=MACHINE)  # of several missing effects the first
+    assert named.accepted and any(clause in sentence for sentence in named.assumptions)
     assert not updated(data, "weak_strut").rises
 
 

@@ -170,8 +170,9 @@ class Update(FolderResult):
     def rises(self) -> list[str]:
         """Conditions under which left-out points are predicted worse than as given, beyond chance; insufficient forms.
 
-        Load, set-up and tool: a path is under one of each as a whole, and what falls on average may rise there. What a
-        diagnosis would rule out (`gates`) stands in for something else.
+        Load, set-up and tool: a path is under one of each as a whole, and what falls on average may rise there. What
+        `auto` found and a diagnosis would rule out stands in for something else; of several missing effects the user
+        may add one at a time.
         """
         data, first, last = self.task.data.of_tip, self.steps[0].held, self.model.held
         conditions = {
@@ -191,12 +192,13 @@ class Update(FolderResult):
         # A form that leaves more than scatter stands in for something else, which acts differently elsewhere; what
         # an instrument's error leaves would be taken for the machine's. So does one beside which the law has to move.
         names, of_instrument, law_free = self.model.fit.names, self.model.instruments, self.model.fit.law_free
-        parts = [*names, *([LAW_REFITTED] if law_free else [])]
-        if (chance := gate_of(self.task.problem, self.noise, self.model.fit, self.task.seed).probability) <= ADEQUATE:
-            clauses.append(f"the readings are not explained by {joined(parts)}: p = {chance:.2g}")
+        if self.task.auto and self._unexplained:
+            clauses.append(self._unexplained)
         if self.described and law_free:
             clauses.append("what was read off these readings needs another strut law, too")
-        beside = f"{joined(parts)} together leave" if of_instrument and len(of_instrument) < len(parts) else ""
+        beside = (
+            f"{joined(self._parts)} together leave" if of_instrument and len(of_instrument) < len(self._parts) else ""
+        )
         of = "what was read off these readings leaves" if self.described else beside
         if of and left > LACKING * floor:
             clauses.append(f"{of} {left:.2f} % at left-out points, scatter {floor:.2f} %")
@@ -205,6 +207,19 @@ class Update(FolderResult):
             predicted = f"{100 * refitted.mean_error:.2f} % beside the refitted one"
             clauses.append(f"{left:.2f} % are left at left-out points beside the strut law as given, {predicted}")
         return clauses
+
+    @cached_property
+    def _unexplained(self) -> str:
+        """Clause on readings that the changes do not explain, by the absolute gate of a diagnosis; "" if they may."""
+        chance = gate_of(self.task.problem, self.noise, self.model.fit, self.task.seed).probability
+        return (
+            f"the readings are not explained by {joined(self._parts)}: p = {chance:.2g}" if chance <= ADEQUATE else ""
+        )
+
+    @property
+    def _parts(self) -> list[str]:
+        """Names of the effects in the model, and of a refitted law."""
+        return [*self.model.fit.names, *([LAW_REFITTED] if self.model.fit.law_free else [])]
 
     @property
     def supported(self) -> bool:
@@ -398,6 +413,8 @@ class Update(FolderResult):
             sentences.append(
                 f"all readings are under {loads[0]:g} N; at other loads the stiffness is taken to be the same"
             )
+        if self.changed and not (self.task.auto or self.search) and self._unexplained:
+            sentences.append(f"{self._unexplained}; what else is missing acts along a path, too")
         if self.search:
             return [
                 *sentences,
