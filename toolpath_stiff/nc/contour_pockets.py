@@ -18,6 +18,7 @@ from toolpath_stiff.nc.geometry import refuse_arc_if
 from toolpath_stiff.nc.pockets import MOST_LAYERS, Cut, Feeds, Heights
 
 FLAT_MM, NEAR_MM = 2e-3, 1e-2  # chords of arcs; what two paths may differ by
+ROUNDING_MM = 1e-5  # by which a way from ring to ring may leave the tool's room
 QUARTER = 32  # chords of a quarter of a circle round corners
 
 
@@ -97,7 +98,7 @@ def clear_area(
 
     The tool goes straight from ring to ring where that stays within its room, otherwise up to the safe height.
     """
-    rings, inner, way = list[Contour](), room.buffer(-step, QUARTER), room.buffer(NEAR_MM)
+    rings, inner, way = list[Contour](), room.buffer(-step, QUARTER), room.buffer(ROUNDING_MM)
     while not inner.is_empty:
         rings += _edges(inner.simplify(FLAT_MM), turn)
         refuse_arc_if(len(rings) > MOST_LAYERS, "a pocket in too many rings", "a larger step")
