@@ -249,22 +249,17 @@ class HeidenhainRun(ProgramRun):
         """The contour of a label, with the side of its compensation, drawn beside the run."""
         state, base, side, row = self.state, len(self._levels), 0, self._label(self._at, f"{label:g}", None) + 1
         self.state = drawn = drawing(state)
-        drawn.plain.parameters, drawn.plain.radius, drawn.plain.tool_feed = (
-            state.plain.parameters,
-            state.plain.radius,
-            1.0,
-        )
+        drawn.plain.parameters, drawn.plain.radius = state.plain.parameters, state.plain.radius
+        drawn.plain.tool_feed = 1.0  # any: the cycle has its own
         try:
-            while (
-                (statement := self._statement(row)).head != "LBL"
-                or len(self._levels) > base
-                or not END_OF_LABEL.fullmatch(statement.rest)
-            ):
+            while True:
+                statement = self._statement(row)
+                if statement.head == "LBL" and len(self._levels) == base and END_OF_LABEL.fullmatch(statement.rest):
+                    break
                 self._count_block(row)
                 if statement.head and statement.head not in DRAWS and statement.head[0] != "Q":
-                    raise self._fail(
-                        row, f"{statement.head} in a contour of cycle 14", "contour elements, Q parameters"
-                    )
+                    problem = f"{statement.head} in a contour of cycle 14"
+                    raise self._fail(row, problem, "contour elements, Q parameters")
                 side = next((SIDES[word.letter] for word in statement.words if word.letter in SIDES), side)
                 words = tuple(w._replace(letter="R0") if w.letter in SIDES else w for w in statement.words)
                 row = self._acted(row, replace(statement, words=words)) if statement.head else statement.after
