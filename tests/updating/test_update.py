@@ -115,9 +115,9 @@ def test_what_the_form_of_an_instruments_error_leaves_is_none_of_the_machines():
         data, stiffness=data.stiffness * (1.0 - along_y * np.array([0.04, 0.16])[np.arange(len(along_y)) // 3 % 2])
     )
     found = updated(uneven, "weak_strut", "gauge_scale:direction=Y")
-    assert not found.accepted and any("together leave" in clause for clause in found.rises)
+    assert not found.accepted and any("together leave" in clause for clause in found.objections)
     even = replace(data, stiffness=data.stiffness * (1.0 - 0.1 * along_y))
-    assert not updated(even, "weak_strut", "gauge_scale:direction=Y").rises
+    assert not updated(even, "weak_strut", "gauge_scale:direction=Y").objections
 
 
 def test_what_leaves_a_pattern_that_no_noise_makes_is_not_written_unless_named():
@@ -130,10 +130,10 @@ def test_what_leaves_a_pattern_that_no_noise_makes_is_not_written_unless_named()
     )
     by_itself = updated(patterned, auto=True, believe=MACHINE)
     assert "weak_strut" in by_itself.added and not by_itself.accepted
-    assert any(clause in sentence for sentence in by_itself.rises)
+    assert any(clause in sentence for sentence in by_itself.objections)
     named = updated(patterned, "weak_strut", believe=MACHINE)  # of several missing effects the first
     assert named.accepted and any(clause in sentence for sentence in named.assumptions)
-    assert not updated(data, "weak_strut").rises
+    assert not updated(data, "weak_strut").objections
 
 
 def test_auto_finds_the_hidden_sizes(two):
