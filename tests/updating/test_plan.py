@@ -82,7 +82,7 @@ def test_another_visit_never_narrows_a_gap(made_up, seed):
     share = pairs[0][2]
     chosen = np.random.default_rng(seed).choice(len(visits), 3, replace=False)
     before = share.gap(chosen)
-    assert (share.gaps_with(chosen) >= before - 1e-6).all()
+    assert (np.sqrt(share.squares_with(chosen)) >= before - 1e-6).all()
 
 
 def nudged(fit: Rival) -> Rival:
@@ -200,7 +200,7 @@ def test_riser_against_table_is_split_by_the_same_pose_without_the_riser():
     """At the very poses that were measured on the riser, upright, reference tool."""
     found = plan_for("setup_compliance", "table_compliance", max_tilt=0.0, tool_extensions=(0.0,))
     share = found.shares[("setup_compliance", "table_compliance")]
-    gaps, visits = share.gaps_with(()), found.visits
+    gaps, visits = np.sqrt(share.squares_with(())), found.visits
     on_riser = (visits.label != "") & (visits.pose[:, 2] > 1.0)
     with_riser, without = on_riser & (visits.setup == "riser"), on_riser & (visits.setup == "no riser")
     assert (gaps[without] > 2.0 * gaps[with_riser]).all()  # place by place, the same readings

@@ -48,47 +48,68 @@ def repeat_and_clamping(relative: float | tuple[float, float]) -> tuple[float, f
     return repeat, clamping
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class GapShares:
-    """Contributions of v visits to the gap of a pair of rivals: a (v,), h (v, q), M (v, q, q)."""
+    """What v visits add to the gap of a pair of rivals: the distance of their forecasts in standard deviations.
 
-    a: FloatArray
-    h: FloatArray
-    M: FloatArray
+    Attributes
+    ----------
+    visits, noise
+        Made of m readings, and how these scatter.
+    difference, factor
+        (m,) of the two forecasts of ln k; (m, q) of the covariance of that difference which all visits share.
+    """
+
+    visits: Visits
+    noise: ReadingNoise
+    difference: FloatArray
+    factor: FloatArray
 
     def gap(self, chosen: Sequence[int] | IntArray) -> float:
         """Gap after the chosen visits, in standard deviations."""
-        index = np.asarray(chosen, dtype=np.int64)
-        return float(_gap(self.a[index].sum(), self.h[index].sum(axis=0), self.M[index].sum(axis=0)))
+        return float(np.sqrt(self._after(chosen)[0]))
 
-    def gaps_with(self, chosen: Sequence[int] | IntArray) -> FloatArray:
-        """(v,) gap after the chosen visits and one more, for every visit that could be added."""
-        index = np.asarray(chosen, dtype=np.int64)
-        sums = self.a[index].sum(), self.h[index].sum(axis=0), self.M[index].sum(axis=0)
-        return _gap(self.a + sums[0], self.h + sums[1], self.M + sums[2])
+    def squares_with(self, chosen: Sequence[int] | IntArray) -> FloatArray:
+        """(v,) square of the gap after the chosen visits and one more, for every visit that could be added.
 
+        By the chain rule: one more adds e^T C^-1 e, with e by how much its readings still differ once the chosen ones
+        are known, and C the covariance of that.
+        """
+        square, explained, root = self._after(chosen)
+        left, open_factor = self.difference - self.factor @ explained, self.factor @ root
+        counts, squares = self.visits.counts, np.empty(len(self.visits))
+        for count in np.unique(counts).tolist():  # all visits with the same number of readings at once
+            alike = np.flatnonzero(counts == count)
+            rows = self.visits.members[self.visits.starts[alike, None] + np.arange(count)]
+            open_rows, left_rows = open_factor[rows], left[rows][..., None]
+            covariance = self._scatter(count) + open_rows @ np.swapaxes(open_rows, 1, 2)
+            squares[alike] = square + (left_rows * np.linalg.solve(covariance, left_rows))[..., 0].sum(axis=1)
+        return squares
 
-def _gap(a: FloatArray, h: FloatArray, M: FloatArray) -> FloatArray:
-    solved = np.linalg.solve(np.eye(h.shape[-1]) + M, h[..., None])[..., 0]
-    return np.asarray(np.sqrt(np.maximum(a - (h * solved).sum(axis=-1), 0.0)))
+    def _after(self, chosen: Sequence[int] | IntArray) -> tuple[float, FloatArray, FloatArray]:
+        """Square of the gap after the chosen visits; (q,) what they explain of `factor`, and (q, q) a root of the rest.
+
+        With M and h the sums of F^T N^-1 F and F^T N^-1 d over visits: (1 + M)^-1 h, and R R^T = (1 + M)^-1.
+        """
+        information, pull, square = np.eye(self.factor.shape[1]), np.zeros(self.factor.shape[1]), 0.0
+        for visit in np.asarray(chosen, dtype=np.int64).tolist():
+            rows = self.visits.members[self.visits.starts[visit] :][: self.visits.counts[visit]]
+            factor, difference = self.factor[rows], self.difference[rows]
+            weighted = np.linalg.solve(self._scatter(len(rows)), np.column_stack([factor, difference]))
+            information, pull = information + factor.T @ weighted[:, :-1], pull + factor.T @ weighted[:, -1]
+            square += float(difference @ weighted[:, -1])
+        explained = np.linalg.solve(information, pull)
+        return max(square - float(pull @ explained), 0.0), explained, np.linalg.inv(np.linalg.cholesky(information)).T
+
+    def _scatter(self, count: int) -> FloatArray:
+        """(k, k) covariance of the difference of two outcomes of a visit of k readings."""
+        return np.asarray(2.0 * (self.noise.repeat**2 * np.eye(count) + self.noise.clamping**2))
 
 
 def pair_shares(visits: Visits, first: Forecast, second: Forecast, noise: ReadingNoise) -> GapShares:
     """Contributions of the visits to the gap of two rivals."""
-    difference = first.mean - second.mean
-    F = np.concatenate([first.factor, second.factor, np.sqrt(2.0) * noise.machine], axis=1)
-    columns = np.concatenate([difference[:, None], F], axis=1)[visits.members]
-    starts, counts, q = visits.starts, visits.counts, columns.shape[1]
-    products = np.empty((len(counts), q, q))
-    for count in np.unique(counts).tolist():  # all visits with the same number of rows at once
-        alike = np.flatnonzero(counts == count)
-        rows = columns[starts[alike, None] + np.arange(count)]
-        products[alike] = np.swapaxes(rows, 1, 2) @ rows
-    sums = np.add.reduceat(columns, starts, axis=0)
-    # Inverse of 2 (r^2 1 + c^2 11^T) by Sherman and Morrison.
-    common = noise.clamping**2 / (noise.repeat**2 + counts * noise.clamping**2)
-    form = (products - common[:, None, None] * sums[:, :, None] * sums[:, None, :]) / (2.0 * noise.repeat**2)
-    return GapShares(form[:, 0, 0], form[:, 1:, 0], form[:, 1:, 1:])
+    factor = np.concatenate([first.factor, second.factor, np.sqrt(2.0) * noise.machine], axis=1)
+    return GapShares(visits, noise, first.mean - second.mean, factor)
 
 
 @dataclass(frozen=True)

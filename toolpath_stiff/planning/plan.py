@@ -182,7 +182,7 @@ class RivalPlan:
             common = set.intersection(*(set(rival.names) for rival in both))
             effects = [active.effect for rival in both for active in rival.effects]
             places = {effect.link: telling(effect) for effect in effects if effect.name not in common}
-            best, gap = float(share.gaps_with(())[self.usable].max()), share.gap(self.chosen)
+            best, gap = float(np.sqrt(share.squares_with(())[self.usable].max())), share.gap(self.chosen)
             pairs.append(PairGap(names, gap, best, gap >= LEAST_GAP, places))
         return tuple(sorted(pairs, key=lambda pair: pair.separation_sigma))
 
@@ -378,15 +378,15 @@ def choose(
 ) -> tuple[int, ...]:
     """Up to `n` usable visits, chosen one by one, each the one that lowers the bound most per minute."""
 
-    def log_bound(gaps: Mapping[Pair, FloatArray]) -> FloatArray:
-        terms = [0.5 * np.log(weights[i] * weights[j]) - gap**2 / 4.0 for (i, j), gap in gaps.items()]
+    def log_bound(squares: Mapping[Pair, FloatArray]) -> FloatArray:
+        terms = [0.5 * np.log(weights[i] * weights[j]) - square / 4.0 for (i, j), square in squares.items()]
         return np.asarray(np.logaddexp.reduce(terms, axis=0))
 
     chosen: list[int] = []
     free = usable.copy()
     now = float(log_bound({pair: np.zeros(()) for pair in shares}))
     while free.any() and len(chosen) < n:
-        after = log_bound({pair: share.gaps_with(chosen) for pair, share in shares.items()})
+        after = log_bound({pair: share.squares_with(chosen) for pair, share in shares.items()})
         best = int(np.argmax(np.where(free, (now - after) / visits.further_minutes(chosen), -np.inf)))
         chosen.append(best)
         now = float(after[best])
