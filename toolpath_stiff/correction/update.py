@@ -140,6 +140,8 @@ def build_ladder(task: UpdateTask) -> Update:
         steps.append(better)
         supports.append(tried[-1])
         tried = []
+    if task.auto and len(steps[-1].fit.candidates) > 1:  # each was judged before those after it were there
+        supports = _supports(task, steps[-1].fit, [[candidate] for candidate in steps[-1].fit.candidates])
     names = steps[-1].fit.names
     if steps[-1].fit.law_free and (names or task.strut_law or task.auto):
         given, law = _law_support(task, steps[-1])
