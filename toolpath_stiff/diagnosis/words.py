@@ -93,13 +93,15 @@ def _cause(diagnosis: Diagnosis, name: str) -> str:
     chance = _percent(diagnosis.main.probability.get(name, 0.0))
     if name == NONE:
         return f"nothing is missing (probability {chance})"
-    if name not in diagnosis.fits:
-        return f"({name}, probability {chance})"
-    fit = diagnosis.fits[name]
-    unusual = f", more than is usual ({joined(sizes)}) " if (sizes := _unusual(fit)) else " "
     words = f"probability {chance}"
     if diagnosis.main.probability.get(name, 0.0) < SHOWN and name in diagnosis.main.votes:
         words = f"less likely than {100 * SHOWN:g} %, but predicts pose after pose as well"
+    if name not in diagnosis.fits:  # a rival in fair form only
+        titles = {family.name: family.effect.title for family in diagnosis.main.families}
+        parts = joined([titles.get(part, part) for part in name.split(" + ")])
+        return f"{parts} in a more general form than the catalogue has ({name}, {words})"
+    fit = diagnosis.fits[name]
+    unusual = f", more than is usual ({joined(sizes)}) " if (sizes := _unusual(fit)) else " "
     return f"{joined(fit.findings)}{unusual}({name}, {words})"
 
 
@@ -128,6 +130,8 @@ def _rivals(diagnosis: Diagnosis) -> str:
     causes = [f"{_cause(diagnosis, entry[0])}{_alike(entry)}" for entry in diagnosis.entries]
     if len(diagnosis.explanations) < 2:
         return f"{_capital(causes[0])} is likeliest, but something else is not ruled out."
+    if len(causes) == 1 and diagnosis.best:
+        return f"{_capital(causes[0])}."
     if diagnosis.explanations[0] not in (NONE, diagnosis.best):
         return f"What is likeliest lowers no error at points that are left out: {'; '.join(causes)}."
     if diagnosis.explanations[0] == NONE and diagnosis.main.votes:
@@ -146,7 +150,18 @@ def _rivals(diagnosis: Diagnosis) -> str:
 
 
 def _alike(entry: Sequence[str]) -> str:
-    return f" - or, alike at these poses, {joined(entry[1:])}" if entry[1:] else ""
+    """Words on what else is in an entry: what is alike, and what may stand in place of a strut law that had to move."""
+    own = [] if entry[0] == NONE else entry[0].split(" + ")
+    further = [[part for part in name.split(" + ") if part not in own] for name in entry[1:]]
+    instead = [more for name, more in zip(entry[1:], further, strict=True) if own and {*own} < {*name.split(" + ")}]
+    alike = [name for name, more in zip(entry[1:], further, strict=True) if more not in instead]
+    words = f" - or, alike at these poses, {joined(alike)}" if alike else ""
+    if not instead:
+        return words
+    parts = ", ".join(part for more in instead for part in more)
+    return (
+        f"{words}; the strut law had to move for it, or else, with the file's law, one of these is there too: {parts}"
+    )
 
 
 def _most_left(diagnosis: Diagnosis) -> str:

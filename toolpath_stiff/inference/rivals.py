@@ -77,7 +77,8 @@ def entries(problem: Problem, fits: Mapping[str, Fit], names: Sequence[str]) -> 
     """Explanations grouped where they sit at the same places and votes on these readings could not tell them apart.
 
     In the order of `names`; one that is in no `fits` stands alone. The votes between two that differ by d in whitened
-    residuals come to d^2 / 2 where one of them is true. A refitted law sits where `SERIES` does beside the file's.
+    residuals come to d^2 / 2 where one of them is true. A refitted law sits where `SERIES` does beside the file's; what
+    stands in place of an explanation's refitted law is an open end of that explanation and none beside it.
     """
     groups: list[tuple[str, ...]] = []
     for name in names:
@@ -94,6 +95,8 @@ def _alike(problem: Problem, fit: Fit, other: Fit) -> bool:
     def places(fit: Fit) -> list[str]:
         return sorted(place_of(c.effect) for c in fit.candidates if fit.law_free or c.name not in SERIES)
 
+    if other.names and {*other.names} < {*fit.names} and other.law_free > fit.law_free:
+        return True
     apart = float(problem.scatter.precision.squares(fit.residual - other.residual))
     twins = TWINS if fit.candidates and other.candidates else 0.0
     return 0.5 * apart <= (SMALL if places(fit) == places(other) else twins)
