@@ -160,7 +160,7 @@ def _alike(entry: Sequence[str]) -> str:
         return words
     parts = ", ".join(part for more in instead for part in more)
     return (
-        f"{words}; the strut law had to move for it, or else, with the file's law, one of these is there too: {parts}"
+        f"{words}; the strut law had to move for it, or with the file's law one of these is there too: {parts}"
     )
 
 
