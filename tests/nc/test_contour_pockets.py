@@ -8,9 +8,9 @@ import pytest
 
 from tests.nc.test_heidenhain import read
 from toolpath_stiff.errors import ProgramError
+from toolpath_stiff.nc.contouring.drawing import backward, path_beside
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.geometry import ArcError
-from toolpath_stiff.nc.heidenhain.drawing import backward, path_beside
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.tables import Offsets
 from toolpath_stiff.nc.words import Block, Word

@@ -1,6 +1,7 @@
 """Geometry of words: planes, arcs of G2 and G3 within LinuxCNC's tolerances, corners, tool axes. mm, rad."""
 
 import math
+from collections.abc import Sequence
 
 from toolpath_stiff.nc.tables import LARGEST_MM
 from toolpath_stiff.units import MM_PER_INCH
@@ -35,6 +36,16 @@ def normal_of(plane: str) -> Vector:
     """
     normal = PLANES[plane][2]
     return (float(normal == 0), float(normal == 1), float(normal == 2))
+
+
+def dot(a: Sequence[float], b: Sequence[float]) -> float:
+    """Scalar product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Sequence[float], b: Sequence[float]) -> Vector:
+    """Vector product."""
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 class ArcError(Exception):

@@ -14,7 +14,7 @@ from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.compensation import RadiusCompensation
 from toolpath_stiff.nc.controller import GENERIC, Dialect
 from toolpath_stiff.nc.elements import Element
-from toolpath_stiff.nc.frames import Frames
+from toolpath_stiff.nc.frames import UNIT, Frames, Matrix
 from toolpath_stiff.nc.geometry import ArcError
 from toolpath_stiff.nc.moves import Move, Recorder, Remark, Unsupported
 from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD, ToolEntry, tool_of
@@ -166,6 +166,9 @@ class CurrentBlock:
 START = "before its first move the tool stands at 0, 0, 0 of the control, as LinuxCNC assumes"
 
 
+Values = dict[str, float]  # parameters of a cycle, by their names
+
+
 @dataclass
 class Conversational:
     """State kept only by controls with words of their own (Heidenhain, Siemens); mm, degrees, program axes.
@@ -225,7 +228,7 @@ class Conversational:
     closes: complex = complex(math.nan, math.nan)
     fast: bool = False
     to_corner: bool = False
-    cycle: tuple[int, dict[str, float]] | None = None
+    cycle: tuple[int, Values] | None = None
     modal: bool = False
     pattern: list[tuple[complex, float]] = field(default_factory=list)
     shift: list[float] = field(default_factory=lambda: [0.0] * 3)
@@ -233,7 +236,7 @@ class Conversational:
     angle: float = 0.0
     mirrored: frozenset[int] = frozenset()
     scale: float = 1.0
-    tilt: list[list[float]] | None = None
+    tilt: Matrix | None = None
     doubt: str = ""
     unknown: set[int] = field(default_factory=set)
     tool_feed: float | None = None
@@ -245,7 +248,7 @@ class Conversational:
     names: dict[str, int] = field(default_factory=dict)
     stock: dict[str, list[float]] = field(default_factory=dict)
     parameters: dict[str, float] = field(default_factory=dict)
-    inner: list[list[float]] = field(default_factory=lambda: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    inner: Matrix = field(default_factory=lambda: [list(row) for row in UNIT])
     renumbered: set[int] = field(default_factory=set)
     side: str = ""
     entry: str = ""
@@ -254,7 +257,7 @@ class Conversational:
     base: str = ""
     contour: list[Element] = field(default_factory=list)
     labels: list[float] = field(default_factory=list)
-    contour_data: dict[str, float] = field(default_factory=dict)
+    contour_data: Values = field(default_factory=dict)
     drawn: Callable[[CurrentBlock, float], tuple[list[Element], int]] | None = None
     offsets_named: bool = False
     changes_by_t: bool = False

@@ -13,7 +13,7 @@ import math
 from dataclasses import dataclass
 
 from toolpath_stiff.nc.elements import meetings
-from toolpath_stiff.nc.geometry import RELATIVE_TOLERANCE, ArcError, Vector, check_bulge, refuse_arc_if
+from toolpath_stiff.nc.geometry import RELATIVE_TOLERANCE, ArcError, Vector, check_bulge, cross, dot, refuse_arc_if
 from toolpath_stiff.nc.moves import Arc
 from toolpath_stiff.units import MM_PER_INCH
 
@@ -41,16 +41,6 @@ class Circle:
     radius: float
     line: int
     sweep: float | None = None
-
-
-def dot(a: Vector, b: Vector) -> float:
-    """Scalar product."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def cross(a: Vector, b: Vector) -> Vector:
-    """Vector product."""
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 def along(point: Vector, direction: Vector, distance: float) -> Vector:

@@ -13,14 +13,14 @@ from contextlib import suppress
 
 from toolpath_stiff.nc import contour_pockets as areas
 from toolpath_stiff.nc.compensation import GOUGE, SMALLER
+from toolpath_stiff.nc.contouring.contour import mill, tool_radius
+from toolpath_stiff.nc.contouring.drawing import backward, is_closed, path_beside
+from toolpath_stiff.nc.contouring.points import in_plane, inch_tenths, present
 from toolpath_stiff.nc.elements import Contour
 from toolpath_stiff.nc.geometry import PLANES, ArcError
-from toolpath_stiff.nc.heidenhain.contour import mill, tool_radius
-from toolpath_stiff.nc.heidenhain.drawing import backward, is_closed, path_beside
-from toolpath_stiff.nc.heidenhain.milling import AUTO, BESIDE_MM, MAX, MOST_ROUNDS, Values, floors_of, note_inside
-from toolpath_stiff.nc.heidenhain.points import in_plane, inch_tenths, present
+from toolpath_stiff.nc.heidenhain.milling import AUTO, BESIDE_MM, MAX, MOST_ROUNDS, floors_of, note_inside
 from toolpath_stiff.nc.pockets import Cut, Feeds, along
-from toolpath_stiff.nc.state import CurrentBlock, State
+from toolpath_stiff.nc.state import CurrentBlock, State, Values
 from toolpath_stiff.nc.tables import tool_of
 
 Contours = list[tuple[Contour, int]]  # with +1 of RL, -1 of RR, 0

@@ -9,20 +9,15 @@ import cmath
 import math
 import re
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 
-from toolpath_stiff.nc.codes.motion import record_strokes
+from toolpath_stiff.nc.contouring.contour import Stroke, check_known, direction, go, plunge
+from toolpath_stiff.nc.contouring.points import feed, inch_tenths, named, outside_contour, present
 from toolpath_stiff.nc.geometry import PLANES
-from toolpath_stiff.nc.heidenhain.contour import check_known, direction, go
 from toolpath_stiff.nc.heidenhain.milling import AUTO, MAX, MILLED, mill_form
-from toolpath_stiff.nc.heidenhain.points import feed, inch_tenths, named, outside_contour, present
-from toolpath_stiff.nc.moves import CYCLE, RAPID
-from toolpath_stiff.nc.state import CurrentBlock, State
+from toolpath_stiff.nc.state import CurrentBlock, State, Values
 from toolpath_stiff.nc.strokes import MOST_STROKES, SAME_HEIGHT_MM
 from toolpath_stiff.units import SECONDS_PER_DAY
-
-Values = dict[str, float]
-Stroke = tuple[float, float | None, float]  # height, feed, dwell after it
 
 _ALL, _DRILL = ("Q200", "Q201", "Q203"), ("Q200", "Q201", "Q206", "Q203")
 CONTOURS = {
@@ -158,13 +153,6 @@ def call(state: State, block: CurrentBlock, change: Values | None = None) -> Non
     path = strokes(number, values, state.speed)
     feeds = {None: None, MAX: None, AUTO: plain.tool_feed or 0.0}
     plunge(state, block, ((at * unit, feeds.get(rate, (rate or 0.0) * pitch), wait) for at, rate, wait in path))
-
-
-def plunge(state: State, block: CurrentBlock, path: Iterable[Stroke]) -> None:
-    """Carry out strokes at the present point, in mm and mm/min; a feed of 0 means that none was given."""
-    modal, moves = state.feed, ((height, RAPID if rate is None else CYCLE, rate, wait) for height, rate, wait in path)
-    record_strokes(state, block, PLANES[state.plane][2], moves, SAME_HEIGHT_MM)
-    state.feed, state.plain.heading = modal, None
 
 
 def strokes(number: int, values: Values, speed: float) -> Iterator[Stroke]:

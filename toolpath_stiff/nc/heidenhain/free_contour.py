@@ -11,11 +11,11 @@ import math
 from collections import defaultdict
 from dataclasses import dataclass
 
+from toolpath_stiff.nc.contouring.contour import arc_to, compensate, direction, go
+from toolpath_stiff.nc.contouring.points import FREE_POLE, ON_CIRCLE_MM, feed, in_plane, inch_tenths, present
 from toolpath_stiff.nc.geometry import PLANES
-from toolpath_stiff.nc.heidenhain.contour import arc_to, compensate, corner, direction, go
-from toolpath_stiff.nc.heidenhain.points import FREE_POLE, ON_CIRCLE_MM, feed, in_plane, present
 from toolpath_stiff.nc.state import CurrentBlock, State
-from toolpath_stiff.nc.words import AXES
+from toolpath_stiff.nc.words import AXES, Word
 
 CORNERS, FREE = ("RND", "CHF"), ("FL", "FLT", "FC", "FCT")
 ANGLES = {"PA", "CCPA", "AN", "IAN", "CCA"}
@@ -53,6 +53,18 @@ def rounding(state: State, block: CurrentBlock, code: str) -> None:
         state.plain.free.append((block, code, False))
     else:
         corner(state, block, code)
+
+
+def corner(state: State, block: CurrentBlock, code: str) -> None:
+    """CHF, RND: cut off or round the corner between the contour elements before and after."""
+    block.refuse_if(state.plain.held is None, None, "without a contour element before it", "L, C, CR or CT before it")
+    size = block.take("#") if code == "CHF" and block.has("#") else block.take("R")
+    rate = block.take("F")
+    if rate is not None:  # holds only for the corner
+        block.values["F alone"] = Word("F", rate * inch_tenths(state), 1, "F")
+    block.refuse_if(not size or size < 0.0, None, "without its size", "RND R5, CHF 2")
+    block.values["size"] = Word("R", (size or 0.0) * state.length_scale, 1, "R")
+    state.plain.corner = block
 
 
 def free_element(state: State, block: CurrentBlock, code: str) -> None:

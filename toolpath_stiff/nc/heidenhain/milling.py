@@ -10,14 +10,13 @@ from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import replace
 
+from toolpath_stiff.nc.contouring.contour import mill, tool_radius
+from toolpath_stiff.nc.contouring.points import in_plane, inch_tenths, present
 from toolpath_stiff.nc.geometry import PLANES
-from toolpath_stiff.nc.heidenhain.contour import mill, tool_radius
-from toolpath_stiff.nc.heidenhain.points import in_plane, inch_tenths, present
 from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.pockets import LEAST_MM, Cut, Feeds, Outline, edge, pocket, sink
-from toolpath_stiff.nc.state import CurrentBlock, State
+from toolpath_stiff.nc.state import CurrentBlock, State, Values
 
-Values = dict[str, float]
 MAX, AUTO = -1.0, -2.0  # FMAX and FAUTO as values of a parameter
 _ALL = ("Q200", "Q201", "Q203", "Q202", "Q206", "Q207")
 MILLED = {

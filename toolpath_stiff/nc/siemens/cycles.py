@@ -8,11 +8,10 @@ import cmath
 import math
 from collections.abc import Iterator
 
+from toolpath_stiff.nc.contouring.contour import Stroke, check_known, go, plunge
+from toolpath_stiff.nc.contouring.points import in_plane, outside_contour, present
 from toolpath_stiff.nc.geometry import PLANES
-from toolpath_stiff.nc.heidenhain.contour import check_known, go
-from toolpath_stiff.nc.heidenhain.cycles import Stroke, Values, plunge
-from toolpath_stiff.nc.heidenhain.points import in_plane, outside_contour, present
-from toolpath_stiff.nc.state import CurrentBlock, State
+from toolpath_stiff.nc.state import CurrentBlock, State, Values
 from toolpath_stiff.nc.strokes import MOST_STROKES, SAME_HEIGHT_MM
 from toolpath_stiff.nc.words import Word
 from toolpath_stiff.units import SECONDS_PER_DAY

@@ -13,9 +13,9 @@ import numpy as np
 
 from toolpath_stiff.nc.codes.motion import record
 from toolpath_stiff.nc.codes.tools import HOLDS_HINT
+from toolpath_stiff.nc.contouring import contour, tilting
+from toolpath_stiff.nc.contouring.points import end_of, in_plane, named, outside_contour, plane_of_pole, polar, present
 from toolpath_stiff.nc.geometry import PLANES
-from toolpath_stiff.nc.heidenhain import contour, functions
-from toolpath_stiff.nc.heidenhain.points import end_of, in_plane, named, outside_contour, plane_of_pole, polar, present
 from toolpath_stiff.nc.moves import ARC, Arc
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES, Word
@@ -167,7 +167,7 @@ def _lean(state: State, block: CurrentBlock) -> None:
     for letter, value in zip(("TX", "TY", "TZ"), turned, strict=True):
         mark(block, letter, "A3", value)
     state.assume(ENDS)
-    functions.vectors(state, block, "LN")
+    tilting.vectors(state, block, "LN")
 
 
 def arc(state: State, block: CurrentBlock, code: str) -> None:

@@ -5,7 +5,7 @@ SIEMENS, SINUMERIK 840D sl, Programming Manual Fundamentals, "Structure and cont
 
 import re
 
-from toolpath_stiff.nc.heidenhain.statements import code_text
+from toolpath_stiff.nc.lines import code_text
 
 HEAD = re.compile(r"\s*(/\d?)?\s*(?:N(\d+)|(:\d+))?\s*(/\d?)?\s*(?:([A-Z_]{2}\w*)\s*:(?![=\d])\s*)?", re.ASCII)
 PROGRAM = re.compile(r"\s*%_N_(\w+?)_(?:MPF|SPF)\b|\s*(?:N\d+\s+)?PROC\s+(\w+)\s*(.*)", re.ASCII)

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from itertools import zip_longest
 
 from toolpath_stiff.nc.heidenhain.expressions import Value
-from toolpath_stiff.nc.heidenhain.statements import code_text
+from toolpath_stiff.nc.lines import code_text
 from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.parametric.run import Step
 from toolpath_stiff.nc.parametric.statements import Statement, Steering

@@ -11,8 +11,7 @@ linear interpolation departs by at most an eighth of the largest of them. Along 
 import math
 from collections.abc import Sequence
 
-from toolpath_stiff.nc.cutter_location.circles import cross, dot
-from toolpath_stiff.nc.geometry import ArcError, Vector, roll_pitch_of_axis
+from toolpath_stiff.nc.geometry import ArcError, Vector, cross, dot, roll_pitch_of_axis
 
 AXIS_TOLERANCE = 1e-3  # of the length of a unit vector: four decimals and a little more
 GREAT_CIRCLE_DEG = 0.01  # how far the tool axis may leave the great circle within a move

@@ -8,10 +8,10 @@ import math
 from contextlib import suppress
 
 from toolpath_stiff.nc.compensation import RadiusCompensation
+from toolpath_stiff.nc.contouring.contour import mill
 from toolpath_stiff.nc.elements import Contour, cut_off, swept
 from toolpath_stiff.nc.frames import Frames
 from toolpath_stiff.nc.geometry import PLANES, ArcError
-from toolpath_stiff.nc.heidenhain.contour import mill
 from toolpath_stiff.nc.pockets import LEAST_MM
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.tables import Offsets
