@@ -15,7 +15,7 @@ from toolpath_stiff.nc.compensation import RadiusCompensation
 from toolpath_stiff.nc.controller import GENERIC, Dialect
 from toolpath_stiff.nc.elements import Element
 from toolpath_stiff.nc.frames import UNIT, Frames, Matrix
-from toolpath_stiff.nc.geometry import ArcError
+from toolpath_stiff.nc.geometry import GeometryError
 from toolpath_stiff.nc.moves import Move, Recorder, Remark, Unsupported
 from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD, ToolEntry, tool_of
 from toolpath_stiff.nc.words import AXES, Block, Word
@@ -148,10 +148,10 @@ class CurrentBlock:
 
     @contextmanager
     def placing(self) -> Iterator[None]:
-        """Add the block's place to errors of geometry (`ArcError`)."""
+        """Add the block's place to errors of geometry (`GeometryError`)."""
         try:
             yield
-        except ArcError as error:
+        except GeometryError as error:
             raise self.fail(None, error.found, error.expected) from None
 
     def fail(self, culprit: Word | str | None, problem: str, expected: str = "", hint: str = "") -> InputError:
@@ -303,6 +303,11 @@ class Record:
         """Add the tool in the spindle to those that moved."""
         if self.tool not in self.used_tools:
             self.used_tools[self.tool] = replace(tool_of(self.tools, self.tool))
+
+    def warn_once(self, sentence: str, line: int) -> None:
+        """Warn of what a line does, unless an earlier one does it too."""
+        if all(remark.text != sentence for remark in self.warnings):
+            self.warnings.append(Remark(sentence, line))
 
     def assume(self, sentence: str) -> None:
         """Note an assumption, once."""

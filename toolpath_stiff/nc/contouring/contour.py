@@ -25,8 +25,7 @@ from toolpath_stiff.nc.contouring.points import (
     polar,
     present,
 )
-from toolpath_stiff.nc.elements import STRAIGHT_ON, Element, cut_off
-from toolpath_stiff.nc.elements import direction as direction_of
+from toolpath_stiff.nc.elements import STRAIGHT_ON, Element, cut_off, direction
 from toolpath_stiff.nc.geometry import PLANES
 from toolpath_stiff.nc.moves import ARC, CYCLE, FEED, RAPID, Remark
 from toolpath_stiff.nc.pockets import Cut
@@ -246,7 +245,7 @@ def arc_to(state: State, block: CurrentBlock, there: dict[int, float], about: Ci
     go(state, block, there, about)
 
 
-def direction(block: CurrentBlock, step: float = 0.0) -> int:
+def turn_of(block: CurrentBlock, step: float = 0.0) -> int:
     """+1 or -1 by DR+ and DR-; without them by the sign of an angle's step."""
     plus, minus = block.take("DR+"), block.take("DR-")
     block.refuse_if(plus is None and minus is None and not step, None, "without its direction", "DR+ or DR-")
@@ -255,7 +254,7 @@ def direction(block: CurrentBlock, step: float = 0.0) -> int:
 
 def radius_circle(state: State, block: CurrentBlock, code: str) -> None:
     """CR: to a point by a radius; a negative one goes the longer way."""
-    turn, there, radius = direction(block), named(state, block), block.take("R")
+    turn, there, radius = turn_of(block), named(state, block), block.take("R")
     if not radius:
         raise block.fail(None, "without its radius", "R")
     start, end = in_plane(state, present(state)), end_of(state, there)
@@ -296,7 +295,7 @@ def _cut_corner(state: State, after: CurrentBlock, element: Element, there: dict
     size, rounded = corner_block.values["size"].value, corner_block.block.words[0].text == "RND"
     after.refuse_if(rapid or there.keys() - {first, second}, None, *_NO_CORNER)
     if "across" in corner_block.values:  # the chamfer's own length, not that along the lines
-        turned = cmath.phase(direction_of(element, held[1]) / direction_of(held, held[1]))
+        turned = cmath.phase(direction(element, held[1]) / direction(held, held[1]))
         size /= 2.0 * max(math.cos(turned / 2.0), STRAIGHT_ON)
     lines = held[2] is None and element[2] is None
     corner_block.refuse_if(not rounded and not lines, None, "beside an arc", "CHF between two lines")

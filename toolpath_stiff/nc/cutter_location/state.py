@@ -1,7 +1,7 @@
 """State of a cutter-location file being read, and the moves of the tool tip that its words record.
 
 Moves go straight, along circles and into holes, with the tool axis turning meanwhile; they begin where the tool stands
-and belong to the line of the statement being executed. They raise `AxisError` and `ArcError`, which know no line, and
+and belong to the line of the statement being executed. They raise `GeometryError`, which knows no line, and
 `InputError`, which does. mm, degrees, mm/min.
 """
 

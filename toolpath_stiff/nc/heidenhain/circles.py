@@ -6,7 +6,7 @@ Cartesian coordinates", "Polar coordinates").
 
 import math
 
-from toolpath_stiff.nc.contouring.contour import arc_to, direction
+from toolpath_stiff.nc.contouring.contour import arc_to, turn_of
 from toolpath_stiff.nc.contouring.points import FREE_POLE, named, plane_of_pole, polar, present
 from toolpath_stiff.nc.geometry import PLANES
 from toolpath_stiff.nc.state import CurrentBlock, State
@@ -28,7 +28,7 @@ def circle(state: State, block: CurrentBlock, code: str) -> None:
     step, turns = block.values.get("IPA"), 1
     block.refuse_if(code == "CP" and not block.has("PA") and step is None, code, "without an angle", "PA or IPA")
     block.refuse_if(block.has("PR") or block.has("IPR"), code, "with a radius", "the radius of its start")
-    turn = direction(block, step.value if step else 0.0)
+    turn = turn_of(block, step.value if step else 0.0)
     if step is not None:
         block.refuse_if(step.value * turn <= 0.0, step, "is against the direction of rotation DR", "the same sign")
         turns = max(1, math.ceil(abs(step.value) / 360.0 - 1e-9))

@@ -11,16 +11,15 @@ import math
 from collections import defaultdict
 from dataclasses import dataclass
 
-from toolpath_stiff.nc.contouring.contour import arc_to, compensate, direction, go
+from toolpath_stiff.nc.contouring.contour import arc_to, compensate, go, turn_of
 from toolpath_stiff.nc.contouring.points import FREE_POLE, ON_CIRCLE_MM, feed, in_plane, inch_tenths, present
-from toolpath_stiff.nc.geometry import PLANES
+from toolpath_stiff.nc.geometry import NOWHERE, PLANES, turned
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES, Word
 
 CORNERS, FREE = ("RND", "CHF"), ("FL", "FLT", "FC", "FCT")
 ANGLES = {"PA", "CCPA", "AN", "IAN", "CCA"}
 WORDS = {"PR", "CCPR", "R", "LEN", "CLSD+", "CLSD-", "DR+", "DR-", "R0", "RL", "RR", "F", "FMAX", "FAUTO"}
-NOWHERE = complex(math.nan, math.nan)
 SAME_DIRECTION = 1e-3  # rad: data that say twice how an element begins may differ by rounding
 NOT_DETERMINED = "is not determined by its own data and those of the elements behind it, or has several solutions"
 Curve = tuple[complex, complex | float]  # a point and the direction of a line; centre and radius with its sign
@@ -90,7 +89,7 @@ def free_element(state: State, block: CurrentBlock, code: str) -> None:
         del plain.free[0]
         plain.to_corner, there = to_corner, {first: end.real, second: end.imag}
         if known[0].turn:
-            arc_to(state, block, there, (center, direction(block), 1))
+            arc_to(state, block, there, (center, turn_of(block), 1))
         else:
             rapid = feed(state, block)
             compensate(state, block, there)
@@ -105,17 +104,13 @@ def _known(state: State, block: CurrentBlock, code: str, start: complex) -> Free
     pole = plain.pole[1] if plain.pole and plain.pole[0] == FREE_POLE else NOWHERE
     if "CLSD+" in v and not cmath.isnan(start):
         plain.closes = start
-    end = _first(complex(v[x], v[y]), pole + _turned(v["PA"], v["PR"]), start + complex(v[f"I{x}"], v[f"I{y}"]))
-    center = _first(complex(v[f"CC{x}"], v[f"CC{y}"]), pole + _turned(v["CCPA"], v["CCPR"]))
+    end = _first(complex(v[x], v[y]), pole + turned(v["PA"], v["PR"]), start + complex(v[f"I{x}"], v[f"I{y}"]))
+    center = _first(complex(v[f"CC{x}"], v[f"CC{y}"]), pole + turned(v["CCPA"], v["CCPR"]))
     end = plain.closes if "CLSD-" in v else end
     before = plain.heading if "IAN" in v and not cmath.isnan(start) else None
-    ahead = before * _turned(v["IAN"]) if before else _turned(v["AN"]) if "AN" in v else None
+    ahead = before * turned(v["IAN"]) if before else turned(v["AN"]) if "AN" in v else None
     turn = 0 if code in ("FL", "FLT") else 1 if "DR+" in v else -1
     return FreeElement(code[-1] == "T", turn, turn * (v["R"] or math.nan), center, end, ahead, v["LEN"], v["CCA"])
-
-
-def _turned(degrees: float, size: float = 1.0) -> complex:
-    return NOWHERE if math.isnan(degrees + size) else cmath.rect(size, math.radians(degrees))
 
 
 def _first(*places: complex) -> complex:
@@ -173,7 +168,7 @@ def _solved(
     if not cmath.isnan(end):
         pass
     elif this.turn and this.angle > 0.0:
-        found = center + (start - center) * _turned(this.turn * this.angle)
+        found = center + (start - center) * turned(this.turn * this.angle)
     elif not this.turn and ahead and (shares or this.length > 0.0):
         found = start + ahead * [*shares, this.length][0]
     elif after and not this.turn and not after.turn and ahead and after.ahead and after.curve:

@@ -80,8 +80,7 @@ def retract(state: State, block: CurrentBlock) -> None:
     leans = state.plain.tilt is None and any(state.frames.position[3:5])
     if distance is None:
         block.refuse_if(block.take("MBMAX") is None, "M140", "without its distance", "MB50 or MB MAX")
-        if RETRACT not in [remark.text for remark in state.warnings]:
-            state.warnings.append(Remark(RETRACT, block.line))
+        state.warn_once(RETRACT, block.line)
         state.plain.unknown |= {0, 1, 2} if leans else {normal}
         return
     block.refuse_if(leans, "M140", "along a tool that leans", "X, Y and Z in an L statement")

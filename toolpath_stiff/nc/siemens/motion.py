@@ -15,7 +15,7 @@ from toolpath_stiff.nc.codes.motion import record
 from toolpath_stiff.nc.codes.tools import HOLDS_HINT
 from toolpath_stiff.nc.contouring import contour, tilting
 from toolpath_stiff.nc.contouring.points import end_of, in_plane, named, outside_contour, plane_of_pole, polar, present
-from toolpath_stiff.nc.geometry import PLANES
+from toolpath_stiff.nc.geometry import PLANES, turned
 from toolpath_stiff.nc.moves import ARC, Arc
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES, Word
@@ -149,7 +149,7 @@ def _by_angle(state: State, block: CurrentBlock) -> None:
         other in plain.renumbered, "ANG", "right after another frame or tool length", f"{AXES[other]} before it"
     )
     way = step.value if step else block.values[AXES[known]].value - here[known] / state.length_scale
-    ahead = cmath.rect(1.0, math.radians(angle))
+    ahead = turned(angle)
     along, across = (ahead.real, ahead.imag) if known == plane[0] else (ahead.imag, ahead.real)
     backward = abs(along) < LEAST_ANGLE or way * along < 0.0
     block.refuse_if(backward, "ANG", "leads away from that end", "its direction")
