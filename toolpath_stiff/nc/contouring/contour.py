@@ -1,7 +1,9 @@
-"""Contour statements: L, LP, LN, CC, C, CP, CR, CT, CTP, and the corners CHF and RND. mm and degrees, in program axes.
+"""Contours by the words of statements: lines, arcs, corners between them, compensation; moves of cycles. mm, degrees.
 
 HEIDENHAIN, user's manuals of the TNC 426, the iTNC 530 and the TNC 640, "Programming contours" ("Path contours:
-Cartesian coordinates", "Polar coordinates"), "Tool compensation". Moves are recorded as those of G0 to G3.
+Cartesian coordinates", "Polar coordinates"), "Tool compensation"; SIEMENS, SINUMERIK 840D sl, Programming Manual
+Fundamentals, "Motion commands", "Tool radius compensation". Words have Heidenhain's names (RL, PA, FMAX), which
+Siemens' get first. Coordinates are those of program axes; moves are recorded as those of G0 to G3.
 """
 
 import cmath

@@ -1,6 +1,7 @@
-"""Points and feeds that the words of a plain statement name: axis words and their steps, polar words, F. mm, degrees.
+"""Points and feeds that the words of a statement name: axis words and their steps, polar words, F. mm, degrees.
 
-HEIDENHAIN, user's manual of the iTNC 530, "Fundamentals of positioning", "Polar coordinates", "Feed rate F".
+HEIDENHAIN, user's manual of the iTNC 530, "Fundamentals of positioning", "Polar coordinates", "Feed rate F"; SIEMENS,
+SINUMERIK 840D sl, Programming Manual Fundamentals, "Travel commands with polar coordinates".
 """
 
 import cmath

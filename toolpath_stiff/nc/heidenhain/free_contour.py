@@ -1,4 +1,4 @@
-"""Free contour programming (FK): lines and arcs whose ends follow from what they and the next elements give. mm.
+"""Corners (CHF, RND); free contours (FK), whose ends follow from what their elements and the next ones give. mm.
 
 HEIDENHAIN, user's manual of the iTNC 530, "Path contours: FK free contour programming". An element waits until it is
 determined. Circles have a direction (radius positive counter-clockwise), so that two of them, a circle and a line, or a

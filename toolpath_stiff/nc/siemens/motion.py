@@ -2,8 +2,8 @@
 
 SIEMENS, SINUMERIK 840D sl, Programming Manual Fundamentals, "Motion commands", "Tool radius compensation"; Job
 Planning, "Transformations". A coordinate is one of its block (X), of a step (IX, from =IC() or in G91), or absolute
-(@X, from =AC()). Contours are made as those of Heidenhain's controls: both enter a compensated contour perpendicular to
-it and round its outside corners.
+(@X, from =AC()). Contours are made by `contouring`, whose names the words get: as on Heidenhain's controls the tool
+enters a compensated contour perpendicular to it and rounds its outside corners.
 """
 
 import cmath
@@ -20,7 +20,7 @@ from toolpath_stiff.nc.moves import ARC, Arc
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES, Word
 
-POLAR = frozenset(("PR", "PA", "IPR", "IPA"))  # RP and AP are named as Heidenhain's PR and PA
+POLAR = frozenset(("PR", "PA", "IPR", "IPA"))  # RP and AP have the names PR and PA here
 SHORTER = ("DC", "ACP", "ACN")
 POINTS = POLAR | {"ANG"} | {f"{kind}{letter}" for letter in AXES for kind in ("", "I", "@", *SHORTER)}
 CENTERS = frozenset((*"IJK", "@I", "@J", "@K", "R", "AR", "TURN"))  # CR is R
@@ -89,7 +89,7 @@ def move(state: State, block: CurrentBlock) -> None:
 
 
 def _name_steps(state: State, block: CurrentBlock) -> None:
-    """Rename coordinates to Heidenhain's names: X, and IX for an increment."""
+    """Rename coordinates to the names of `contouring`: X, and IX for an increment."""
     plain, here = state.plain, present(state)
     for axis, letter in enumerate(AXES):
         if f"@{letter}" in block.free:
