@@ -3,7 +3,7 @@
 HEIDENHAIN, user's manuals of the TNC 426, the iTNC 530 and the TNC 640, "Programming contours" ("Path contours:
 Cartesian coordinates", "Polar coordinates"), "Tool compensation"; SIEMENS, SINUMERIK 840D sl, Programming Manual
 Fundamentals, "Motion commands", "Tool radius compensation". Words have Heidenhain's names (RL, PA, FMAX), which
-Siemens' get first. Coordinates are those of program axes; moves are recorded as those of G0 to G3.
+Siemens' words get before. Coordinates are those of program axes; moves are recorded as those of G0 to G3.
 """
 
 import cmath

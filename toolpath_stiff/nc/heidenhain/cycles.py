@@ -15,7 +15,7 @@ from toolpath_stiff.nc.contouring.points import feed, inch_tenths, named, outsid
 from toolpath_stiff.nc.geometry import PLANES, turned
 from toolpath_stiff.nc.heidenhain.milling import AUTO, MAX, MILLED, mill_form
 from toolpath_stiff.nc.state import CurrentBlock, State, Values
-from toolpath_stiff.nc.strokes import MOST_STROKES, SAME_HEIGHT_MM
+from toolpath_stiff.nc.strokes import MOST_STROKES, SAME_HEIGHT_MM, SHIFT
 from toolpath_stiff.units import SECONDS_PER_DAY
 
 _ALL, _DRILL = ("Q200", "Q201", "Q203"), ("Q200", "Q201", "Q206", "Q203")
@@ -50,7 +50,6 @@ FORMS = {"POS": "X Y", "ROW": "X Y D NUM", "PAT": "X Y DX DY NUMX NUMY", "CIRC":
          "PITCHCIRC": "X Y D NUM STEP"}  # fmt: skip
 UNASKED = {"Z", "ROT", "ROTX", "ROTY", "START"}  # words of PATTERN DEF that may be missing: 0
 _FORM = re.compile(rf"({'|'.join(FORMS)})\d+\s*\(([^)]*)\)")
-HAVE_NO_SHIFT = "the shift off the wall before the tool leaves the hole"
 
 
 def define(state: State, block: CurrentBlock, code: str) -> None:
@@ -71,7 +70,7 @@ def define(state: State, block: CurrentBlock, code: str) -> None:
     if number not in CONTOURS:
         _check(block, number, values)
     if values.get("Q214"):
-        state.note(block.line, block.values["Q214"], HAVE_NO_SHIFT)
+        state.note(block.line, block.values["Q214"], SHIFT)
     plain.cycle, plain.modal = (number, values), False
 
 
