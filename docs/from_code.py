@@ -98,7 +98,7 @@ def statements_table() -> str:
     cells = [*_joined(rows_), *_joined(own), *_joined(listed)]
     refused = [(row.name, row.what, row.hint, row.source) for row in plain_language.REFUSED.values()]
     refused += [(name, what, "", "as M functions") for name, what in tnc.REFUSED.items()]
-    heading = ("statement", "meaning", "function in `nc/heidenhain`", "source", "held by")
+    heading = ("statement", "meaning", "function in `nc/heidenhain`, `nc/contouring`", "source", "held by")
     below = rows(("statement", "what it is", "instead", "source"), *_joined(refused))
     return "\n".join([*rows(heading, *cells), "", "Refused, with the line:", "", *below, ""])
 

@@ -8,6 +8,7 @@ import pkgutil
 import re
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -29,6 +30,15 @@ def modules() -> list[Path]:
 def test_the_rooms_depend_in_one_direction():
     """The contracts of pyproject.toml: layers, the simulator apart, no circles."""
     assert lint_imports(config_filename=str(PACKAGE.parent / "pyproject.toml"), cache_dir=None) == 0
+
+
+def test_every_language_of_programs_is_in_its_contract():
+    """The folders of `nc`: languages that do not import each other, and what they share."""
+    linter = tomllib.loads((PACKAGE.parent / "pyproject.toml").read_text("utf-8"))["tool"]["importlinter"]
+    (layers,) = (rule["layers"] for rule in linter["contracts"] if rule.get("containers") == ["toolpath_stiff.nc"])
+    folders = {path.parent.name for path in (PACKAGE / "nc").glob("*/__init__.py")}
+    assert {name for layer in layers for name in layer.split(" | ")} == folders
+    assert {"heidenhain", "siemens"} <= set(layers[0].split(" | "))
 
 
 def test_a_trespass_is_found(tmp_path, monkeypatch):

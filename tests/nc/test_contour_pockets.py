@@ -8,9 +8,9 @@ import pytest
 
 from tests.nc.test_heidenhain import read
 from toolpath_stiff.errors import ProgramError
+from toolpath_stiff.nc.contouring.drawing import backward, path_beside
 from toolpath_stiff.nc.frames import Frames
-from toolpath_stiff.nc.geometry import ArcError
-from toolpath_stiff.nc.heidenhain.drawing import backward, path_beside
+from toolpath_stiff.nc.geometry import GeometryError
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.tables import Offsets
 from toolpath_stiff.nc.words import Block, Word
@@ -161,14 +161,14 @@ def test_a_path_beside_lines_and_arcs_stays_at_its_distance(seed):
 
 
 def test_what_does_not_fit_is_refused():
-    with pytest.raises(ArcError, match="gouging"):
+    with pytest.raises(GeometryError, match="gouging"):
         path_beside(
             STATE,
             BLOCK,
             [(0j, 9 + 0j, None, 0), (9 + 0j, 9 + 1j, None, 0), (9 + 1j, 18 + 1j, None, 0), (18 + 1j, 18 - 9j, None, 0)],
             -2.0,
         )
-    with pytest.raises(ArcError, match="turns back"):
+    with pytest.raises(GeometryError, match="turns back"):
         path_beside(STATE, BLOCK, [(0j, 9 + 0j, None, 0), (9 + 0j, 0j + 1, None, 0)], 2.0)
     square = [0j, 30 + 0j, 30 + 30j, 30j]
     with pytest.raises(ProgramError, match="narrower than its tool"):

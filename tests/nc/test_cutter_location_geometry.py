@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from tests.nc.cutter_location import MM, START, leaning, read, refused, tilt
 from toolpath_stiff.nc.courses import move_lengths
-from toolpath_stiff.nc.cutter_location.tool_axes import GREAT_CIRCLE_DEG
 from toolpath_stiff.nc.moves import ARC
+from toolpath_stiff.nc.tool_axes import GREAT_CIRCLE_DEG
 from toolpath_stiff.path.sampling import sample_moves
 from toolpath_stiff.rotations import rotation_matrices
 

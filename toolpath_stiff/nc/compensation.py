@@ -21,7 +21,7 @@ import math
 from dataclasses import dataclass, field
 
 from toolpath_stiff.nc.elements import Element, direction, meetings
-from toolpath_stiff.nc.geometry import refuse_arc_if, turn_between
+from toolpath_stiff.nc.geometry import refuse_if, turn_between
 from toolpath_stiff.nc.moves import Move
 
 CORNER = 0.05  # rad; less than this is no corner (LinuxCNC's TOLERANCE_CONCAVE_CORNER)
@@ -145,7 +145,7 @@ class CenterMove:
 def enter(
     cutter: RadiusCompensation, start: complex, target: complex, arc: OffsetArc | None
 ) -> tuple[CenterMove, complex]:
-    """First move, and its direction (arcs have none). Raises `ArcError`.
+    """First move, and its direction (arcs have none). Raises `GeometryError`.
 
     LinuxCNC's, longer than the tool's radius, ends beside its end point, an arc tangent there to the programmed one;
     Fanuc's where the next one says.
@@ -156,10 +156,10 @@ def enter(
     (10+3j)
     """
     if cutter.straight:
-        refuse_arc_if(arc is not None, "an arc as the first move of cutter compensation", "G0 or G1")
+        refuse_if(arc is not None, "an arc as the first move of cutter compensation", "G0 or G1")
         cutter.entering = True
         return CenterMove(target), 0j
-    refuse_arc_if(
+    refuse_if(
         abs(target - start) <= cutter.radius,
         f"the entry move of cutter compensation is {abs(target - start):.4f} mm long in its plane",
         f"more than the tool's radius of {cutter.radius:g} mm",
@@ -172,12 +172,12 @@ def enter(
         _check_fits(cutter, abs(arc.center - start) - TIGHT)
     chord, inward = start - end, (arc.center - end) / abs(arc.center - end)
     along = (chord * inward.conjugate()).real
-    refuse_arc_if(abs(along) < FLAT * abs(chord), "an entry arc that the tool's radius makes straight", SMALLER)
+    refuse_if(abs(along) < FLAT * abs(chord), "an entry arc that the tool's radius makes straight", SMALLER)
     return CenterMove(end, center=end + inward * abs(chord) ** 2 / (2.0 * along)), 0j
 
 
 def go_on(cutter: RadiusCompensation, start: complex, target: complex, arc: OffsetArc | None) -> CenterMove:
-    """Further move, straight or an arc. Raises `ArcError` if the tool cannot follow it or controls differ."""
+    """Further move, straight or an arc. Raises `GeometryError` if the tool cannot follow it or controls differ."""
     element = _element(start, target, arc)
     if arc is not None and cutter.side * arc.turn > 0:
         _check_fits(cutter, abs(arc.center - target))
@@ -188,15 +188,15 @@ def go_on(cutter: RadiusCompensation, start: complex, target: complex, arc: Offs
     alone = len(cutter.pending) < 2 or cutter.rounded
     if cutter.entering:
         problem = "a move along the tool right after the first move of cutter compensation"
-        refuse_arc_if(not alone, problem, "it before G41")
+        refuse_if(not alone, problem, "it before G41")
         cutter.entering = False
         return CenterMove(end, trim=beside)
     turn = cmath.phase(ahead / before)
     if abs(turn) <= TURNED:
         return CenterMove(end)
-    refuse_arc_if(not alone, "a move along the tool in a corner (G41, G42)", "it where the contour is smooth")
+    refuse_if(not alone, "a move along the tool in a corner (G41, G42)", "it where the contour is smooth")
     problem = "a contour under cutter compensation that turns back on itself"
-    refuse_arc_if(abs(turn) > math.pi - TURNED, problem, "another contour")
+    refuse_if(abs(turn) > math.pi - TURNED, problem, "another contour")
     if turn * cutter.side > 0.0 or cutter.rounded:  # an inside corner, as LinuxCNC has it
         return _turn_off(cutter, start, before, ahead, (beside, end), arc, TURNED)
     acute = abs(turn) > math.pi / 2.0 + SHARP  # straight moves go round, a straight move before it is made longer
@@ -211,8 +211,8 @@ def _element(start: complex, target: complex, arc: OffsetArc | None) -> Element:
 
 
 def _check_fits(cutter: RadiusCompensation, radius: float) -> None:
-    """Raise `ArcError` for an arc that the tool, on its inside, cannot follow."""
-    refuse_arc_if(
+    """Raise `GeometryError` for an arc that the tool, on its inside, cannot follow."""
+    refuse_if(
         radius <= cutter.radius,
         f"an inside arc of radius {radius:.4f} mm",
         f"more than the tool's radius, {cutter.radius:g} mm",
@@ -230,7 +230,7 @@ def _turn_off(
 ) -> CenterMove:
     """Move of the tool centre that starts in another direction than the last one ended; `least`: smallest corner.
 
-    Raises `ArcError`.
+    Raises `GeometryError`.
     """
     (beside, end), last, center = ends, cutter.pending[0].arc, cutter.center
     corner = (math.pi / 2.0 - cutter.side * cmath.phase(ahead / before)) % math.tau - math.pi / 2.0  # above 0: convex
@@ -242,7 +242,7 @@ def _turn_off(
         path = (center - before, center, None, 0) if last is None else _element(center, center, last)
         following = (beside, end, None, 0) if arc is None else _element(end, end, arc)
         places, turned = meetings(path, following), last.turn * cutter.side if last is not None else 0
-        refuse_arc_if(not places, GOUGE, SMALLER)
+        refuse_if(not places, GOUGE, SMALLER)
         beyond = -turned if arc is None else arc.turn * (turned or cutter.side)  # off a circle, from inside onto it
         return CenterMove(end, trim=places[beyond > 0])
     if corner > least:

@@ -14,7 +14,7 @@ from shapely.geometry.base import BaseGeometry
 from shapely.geometry.polygon import orient
 
 from toolpath_stiff.nc.elements import Contour, Element, direction, swept
-from toolpath_stiff.nc.geometry import refuse_arc_if
+from toolpath_stiff.nc.geometry import refuse_if
 from toolpath_stiff.nc.pockets import MOST_LAYERS, Cut, Feeds, Heights
 
 FLAT_MM, NEAR_MM = 2e-3, 1e-2  # chords of arcs; what two paths may differ by
@@ -44,13 +44,13 @@ def orientation(contour: Contour) -> int:
 
 
 def area_of(pockets: list[Contour], islands: list[Contour]) -> BaseGeometry:
-    """The area that closed pockets enclose without their islands. Raises `ArcError` where that is not clear."""
+    """The area that closed pockets enclose without their islands. Raises `GeometryError` where that is not clear."""
     outer, inner = ([shapely.Polygon(line_along(contour)) for contour in part] for part in (pockets, islands))
     crossed = not all(shape.is_valid for shape in (*outer, *inner))
-    refuse_arc_if(crossed, "a contour that crosses itself", "one that does not")
+    refuse_if(crossed, "a contour that crosses itself", "one that does not")
     area = shapely.union_all(outer)
     overlap = area.area < sum(shape.area for shape in outer) - FLAT_MM
-    refuse_arc_if(overlap, "pockets that overlap: their order decides what is milled", "one contour for both")
+    refuse_if(overlap, "pockets that overlap: their order decides what is milled", "one contour for both")
     return area.difference(shapely.union_all(inner))
 
 
@@ -101,7 +101,7 @@ def clear_area(
     rings, inner, way = list[Contour](), room.buffer(-step, QUARTER), room.buffer(ROUNDING_MM)
     while not inner.is_empty:
         rings += _edges(inner.simplify(FLAT_MM), turn)
-        refuse_arc_if(len(rings) > MOST_LAYERS, "a pocket in too many rings", "a larger step")
+        refuse_if(len(rings) > MOST_LAYERS, "a pocket in too many rings", "a larger step")
         inner = inner.buffer(-step, QUARTER)
     course, place = list[Contour](), 0j
     for ring in reversed(rings):  # each from its corner nearest to the one before

@@ -7,7 +7,7 @@ centre of a rounding lies where the two elements, set off to its side by its rad
 import cmath
 import math
 
-from toolpath_stiff.nc.geometry import refuse_arc_if, turn_between
+from toolpath_stiff.nc.geometry import refuse_if, turn_between
 
 Element = tuple[complex, complex, complex | None, int]
 Contour = list[Element]
@@ -20,7 +20,7 @@ def direction(element: Element, place: complex) -> complex:
     """Unit vector along an element at one of its points."""
     start, end, center, turn = element
     ahead = end - start if center is None else turn * 1j * (place - center)
-    refuse_arc_if(not abs(ahead), "a corner at an element of no length", "two elements")
+    refuse_if(not abs(ahead), "a corner at an element of no length", "two elements")
     return ahead / abs(ahead)
 
 
@@ -83,7 +83,7 @@ def cut_off(
 ) -> tuple[complex, complex, complex | None, int] | None:
     """Begin, end, centre and turn of the corner between two elements; a chamfer has no centre; None: no corner.
 
-    Raises `ArcError` where it does not fit.
+    Raises `GeometryError` where it does not fit.
 
     Examples
     --------
@@ -95,13 +95,13 @@ def cut_off(
     turned = cmath.phase(v / u)
     if abs(turned) < STRAIGHT_ON:
         return None
-    refuse_arc_if(math.pi - abs(turned) < STRAIGHT_ON, "a corner where the path goes straight back", "another one")
+    refuse_if(math.pi - abs(turned) < STRAIGHT_ON, "a corner where the path goes straight back", "another one")
     turn = 1 if turned > 0.0 else -1
     begin, end, center = apex - size * u, apex + size * v, None
     if rounded:
         places = meetings(before, after, turn * size)
-        refuse_arc_if(not places, TOO_LONG, "a smaller one")
+        refuse_if(not places, TOO_LONG, "a smaller one")
         center = min(places, key=lambda place: abs(place - apex))
         begin, end = (_foot(element, center) for element in (before, after))
-    refuse_arc_if(not (_holds(before, begin) and _holds(after, end)), TOO_LONG, "a smaller one")
+    refuse_if(not (_holds(before, begin) and _holds(after, end)), TOO_LONG, "a smaller one")
     return begin, end, center, turn

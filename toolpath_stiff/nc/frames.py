@@ -12,11 +12,14 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 from toolpath_stiff.arrays import FloatArray
+from toolpath_stiff.nc.geometry import cross
 from toolpath_stiff.nc.kinematics import PostedKinematics
 from toolpath_stiff.nc.tables import Offsets
 from toolpath_stiff.poses import ShopPose
 
 Numbers = TypeVar("Numbers", float, FloatArray)
+Matrix = list[list[float]]
+UNIT: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 STILL = 1e-12  # of a coordinate, or of 1 mm if more: rounding by frames of an axis that does not move
 Rotation = tuple[float, float, float]  # of G68: centre X, Y in program coordinates, angle in degrees
 
@@ -67,7 +70,7 @@ class Frames:
     source: str = ""
     posted: PostedKinematics | None = None
     tip_held: bool = False
-    linear: list[list[float]] | None = None
+    linear: Matrix | None = None
 
     @property
     def bound(self) -> bool:
@@ -126,7 +129,7 @@ class Frames:
         if self.linear is not None:
             first, second, third = self.linear
             x, y, z = (  # the cofactors, whose lengths are the square of the scale
-                sum(c * v for c, v in zip(_cross(a, b), vector, strict=True)) / sum(v * v for v in third)
+                sum(c * v for c, v in zip(cross(a, b), vector, strict=True)) / sum(v * v for v in third)
                 for a, b in ((second, third), (third, first), (first, second))
             )
             vector = (x, y, z)
@@ -211,7 +214,7 @@ def _about(rotation: Rotation, point: list[float], degrees: float) -> list[float
     return [rotation[0] + x, rotation[1] + y, *point[2:]]
 
 
-def rotation_matrix(angles: Sequence[float]) -> list[list[float]]:
+def rotation_matrix(angles: Sequence[float]) -> Matrix:
     """Rz(C) Ry(B) Rx(A) of angles A, B, C in degrees; plain floats, faster than arrays for one matrix."""
     (ca, sa), (cb, sb), (cc, sc) = (
         (math.cos(math.radians(v)), math.sin(math.radians(v))) if v else (1.0, 0.0) for v in angles
@@ -223,14 +226,15 @@ def rotation_matrix(angles: Sequence[float]) -> list[list[float]]:
     ]
 
 
-def _transposed(matrix: list[list[float]]) -> list[list[float]]:
+def _transposed(matrix: Matrix) -> Matrix:
     return [list(column) for column in zip(*matrix, strict=True)]
 
 
-def _cross(a: list[float], b: list[float]) -> list[float]:
-    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-
-
-def rotate(matrix: list[list[float]], vector: list[float]) -> list[float]:
+def rotate(matrix: Matrix, vector: list[float]) -> list[float]:
     """Vector times a matrix."""
     return [sum(m * v for m, v in zip(row, vector, strict=True)) for row in matrix]
+
+
+def product(a: Matrix, b: Matrix) -> Matrix:
+    """Matrix product."""
+    return [[sum(x * y for x, y in zip(row, column, strict=True)) for column in zip(*b, strict=True)] for row in a]

@@ -1,6 +1,8 @@
 """Geometry of words: planes, arcs of G2 and G3 within LinuxCNC's tolerances, corners, tool axes. mm, rad."""
 
+import cmath
 import math
+from collections.abc import Sequence
 
 from toolpath_stiff.nc.tables import LARGEST_MM
 from toolpath_stiff.units import MM_PER_INCH
@@ -22,6 +24,7 @@ PLANES = {"G17": (0, 1, 2), "G18": (2, 0, 1), "G19": (1, 2, 0)}  # first, second
 CENTER_WORDS = ("I", "J", "K")
 CENTER_LETTERS = "IJKR"  # words that an arc alone has
 
+NOWHERE = complex(math.nan, math.nan)
 LEAST_SWEEP = 1e-10  # rad; an arc of less is a whole turn
 
 
@@ -37,22 +40,37 @@ def normal_of(plane: str) -> Vector:
     return (float(normal == 0), float(normal == 1), float(normal == 2))
 
 
-class ArcError(Exception):
-    """Error of an arc: what was found, what was expected."""
+def turned(degrees: float, size: float = 1.0) -> complex:
+    """A length in a direction of the plane; nan where one of them is not known."""
+    return NOWHERE if math.isnan(degrees + size) else cmath.rect(size, math.radians(degrees))
+
+
+def dot(a: Sequence[float], b: Sequence[float]) -> float:
+    """Scalar product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Sequence[float], b: Sequence[float]) -> Vector:
+    """Vector product."""
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+class GeometryError(Exception):
+    """Error of an arc, a corner, a contour, a tool axis: what was found, what was expected."""
 
     def __init__(self, problem: str, expected: str) -> None:
         super().__init__(problem)
         self.found, self.expected = problem, expected
 
 
-def refuse_arc_if(wrong: object, problem: str, expected: str) -> None:
-    """Raise `ArcError` if `wrong`."""
+def refuse_if(wrong: object, problem: str, expected: str) -> None:
+    """Raise `GeometryError` if `wrong`."""
     if wrong:
-        raise ArcError(problem, expected)
+        raise GeometryError(problem, expected)
 
 
 def center_from_radius(start: Point2, end: Point2, radius: float, clockwise: bool) -> Point2:
-    """Centre of an arc given by R; a negative radius takes the longer way. Raises `ArcError`.
+    """Centre of an arc given by R; a negative radius takes the longer way. Raises `GeometryError`.
 
     Examples
     --------
@@ -60,12 +78,12 @@ def center_from_radius(start: Point2, end: Point2, radius: float, clockwise: boo
     (10.0, 0.0)
     """
     chord, other = math.dist(start, end), "another end point, or I, J, K for a full circle"
-    refuse_arc_if(not chord, "an arc with R that ends where it starts", other)
-    refuse_arc_if(radius == 0.0, "an arc of radius 0", "R other than 0")
+    refuse_if(not chord, "an arc with R that ends where it starts", other)
+    refuse_if(radius == 0.0, "an arc of radius 0", "R other than 0")
     half, size = chord / 2.0, abs(radius)
     if half - size > RADIUS_FORMAT_TOLERANCE:
         problem = f"an arc whose radius {size:g} mm cannot reach its end {chord:.4f} mm away"
-        raise ArcError(problem, f"a radius of at least {half:.4f} mm")
+        raise GeometryError(problem, f"a radius of at least {half:.4f} mm")
     height = math.sqrt(max(size * size - half * half, 0.0))
     # The centre lies left of the chord for a short counter-clockwise arc.
     side = 1.0 if (radius > 0.0) != clockwise else -1.0
@@ -75,7 +93,7 @@ def center_from_radius(start: Point2, end: Point2, radius: float, clockwise: boo
 
 
 def check_radii(start: Point2, end: Point2, center: Point2, inch: bool = False) -> float:
-    """The radius at the start; `ArcError` if the end does not lie on its circle within LinuxCNC's tolerance.
+    """The radius at the start; `GeometryError` if the end does not lie on its circle within LinuxCNC's tolerance.
 
     `inch`: it is an inch program, whose ends may be rounded to thousandths; the points are in mm all the same.
 
@@ -86,11 +104,11 @@ def check_radii(start: Point2, end: Point2, center: Point2, inch: bool = False) 
     >>> check_radii((10.0, 0.0), (10.0, 0.0), (10.0, 0.0))
     Traceback (most recent call last):
         ...
-    toolpath_stiff.nc.geometry.ArcError: an arc of radius 0
+    toolpath_stiff.nc.geometry.GeometryError: an arc of radius 0
     """
     first, last = math.dist(start, center), math.dist(end, center)
     if first < SMALLEST_RADIUS or last < SMALLEST_RADIUS:
-        raise ArcError("an arc of radius 0", "a centre apart from the start and the end point")
+        raise GeometryError("an arc of radius 0", "a centre apart from the start and the end point")
     difference, least = abs(first - last), INCH_TOLERANCE if inch else MM_TOLERANCE
     if difference <= least:  # of nearly all arcs
         return first
@@ -98,12 +116,12 @@ def check_radii(start: Point2, end: Point2, center: Point2, inch: bool = False) 
     if difference > allowed:
         radii = f"(radius {first:.4f} mm at the start, {last:.4f} mm at the end)"
         problem = f"an arc whose end lies {difference:.4f} mm off its circle {radii}"
-        raise ArcError(problem, f"radii that agree within {allowed:.4f} mm")
+        raise GeometryError(problem, f"radii that agree within {allowed:.4f} mm")
     return first
 
 
 def check_bulge(radius: float, sweep: float) -> None:
-    """Raise `ArcError` if an arc goes further from its start than coordinates may: its ends do not bound it.
+    """Raise `GeometryError` if an arc goes further from its start than coordinates may: its ends do not bound it.
 
     Examples
     --------
@@ -112,7 +130,7 @@ def check_bulge(radius: float, sweep: float) -> None:
     widest = 2.0 * radius
     if widest > LARGEST_MM and (away := widest * math.sin(min(abs(sweep), math.pi) / 2.0)) > LARGEST_MM:
         problem = f"an arc of radius {radius:g} mm that goes {away:g} mm away from its start"
-        raise ArcError(problem, f"at most {LARGEST_MM:g} mm")
+        raise GeometryError(problem, f"at most {LARGEST_MM:g} mm")
 
 
 def arc_sweep(start: Point2, end: Point2, center: Point2, clockwise: bool, turns: int) -> float:
@@ -132,7 +150,7 @@ def arc_sweep(start: Point2, end: Point2, center: Point2, clockwise: bool, turns
 
 
 def sweep_about(center: Point2, start: Point2, end: Point2, clockwise: bool, inch: bool, turns: int = 1) -> float:
-    """Signed angle of an arc in rad. Raises `ArcError` unless start and end lie on one circle about the centre."""
+    """Signed angle of an arc in rad. Raises `GeometryError` unless start and end lie on one circle about the centre."""
     radius, sweep = check_radii(start, end, center, inch), arc_sweep(start, end, center, clockwise, turns)
     check_bulge(radius, sweep)
     return sweep

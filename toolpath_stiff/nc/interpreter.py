@@ -13,7 +13,7 @@ from toolpath_stiff.nc.codes.motion import homes_standing, record
 from toolpath_stiff.nc.codes.passive import m_parameters
 from toolpath_stiff.nc.codes.registry import CODES, REFUSED
 from toolpath_stiff.nc.codes.tools import list_numbers
-from toolpath_stiff.nc.geometry import ArcError
+from toolpath_stiff.nc.geometry import GeometryError
 from toolpath_stiff.nc.moves import FEED, RAPID
 from toolpath_stiff.nc.state import LAST_MODE, CurrentBlock, Flow, Group, State, Then
 from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD
@@ -100,7 +100,7 @@ def finish(state: State, block: CurrentBlock) -> Then:
     pending = state.corner
     try:
         _move(state, block)
-    except ArcError as error:
+    except GeometryError as error:
         raise block.fail(None, error.found, error.expected, increments_hint(state)) from None
     for letter in CORNERS:
         if block.has(letter):

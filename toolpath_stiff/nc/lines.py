@@ -18,6 +18,7 @@ PORTION = 100  # lines
 # Control characters that no text file holds. It may hold tab, line feed, form feed, carriage return, and the old
 # end-of-file mark of CP/M and DOS (0x1A), which some posts still append.
 BINARY = re.compile("[\x00-\x08\x0b\x0e-\x19\x1b-\x1f\x7f]")
+_COMMENT = re.compile(r'"[^"]*"|;.*')
 _BINARY_BYTES = bytes(code for code in range(128) if BINARY.match(chr(code)))
 
 
@@ -76,6 +77,12 @@ def split_lines(text: str, name: str) -> tuple[str, ...]:
         row = next(row for row, line in enumerate(lines) if len(line) > LONGEST_LINE)
         raise Place(name, row + 1).fail(f"a line of {len(lines[row])} characters", f"lines of at most {LONGEST_LINE}")
     return tuple(lines)
+
+
+def code_text(line: str) -> str:
+    """Line without its comment and continuation mark, in upper case; columns are kept."""
+    text = _COMMENT.sub(lambda part: part[0] if part[0].startswith('"') else "", line) if ";" in line else line
+    return text.rstrip().rstrip("~").rstrip().upper()
 
 
 class TextLines(Sequence[str]):

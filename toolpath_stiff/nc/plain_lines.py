@@ -253,7 +253,7 @@ class Lines:
                 end, middle = self._arc(start, numbers, turn)
                 sweeps.append(geometry.sweep_about(middle, start, end, turn, inch))
                 middles.append(middle)
-        except geometry.ArcError:
+        except geometry.GeometryError:
             self.end = int(rows[len(middles)])
         points[: len(middles), [first, second]] = np.reshape(middles, (-1, 2))
         sweep[rows[: len(middles)]] = sweeps
@@ -269,7 +269,7 @@ class Lines:
         no_x, no_y, no_i, no_j, by_center = map(math.isnan, words[:5])
         fits = by_center != (no_i and no_j) and not (no_x and no_y and not by_center)
         if not fits or abs(off_plane) > 0.0:
-            raise geometry.ArcError("words that do not fit", "")
+            raise geometry.GeometryError("words that do not fit", "")
         a, b = start
         over, up = (0.0, 0.0) if self.state.absolute else start
         end = (a if no_x else over + x * scale, b if no_y else up + y * scale)

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from toolpath_stiff.nc.elements import Element, direction
-from toolpath_stiff.nc.geometry import refuse_arc_if
+from toolpath_stiff.nc.geometry import refuse_if
 
 LEAST_MM = 1e-9  # a side or a step of less is none
 MOST_LAYERS = 10_000  # or rings in a layer
@@ -77,7 +77,7 @@ def layers(top: float, bottom: float, most: float) -> list[float]:
     [-2.0, -5.0]
     """
     count = max(1, math.ceil((top - bottom) / most - LEAST_MM)) if most > 0.0 else 1
-    refuse_arc_if(count > MOST_LAYERS, "infeeds in too many steps", "larger ones")
+    refuse_if(count > MOST_LAYERS, "infeeds in too many steps", "larger ones")
     return [top + (bottom - top) * index / count for index in range(1, count + 1)]
 
 
@@ -90,7 +90,7 @@ def clear(outer: Outline, step: float, height: float, feed: float, turn: int) ->
     for way in (turn, -turn, 0) if abs(apart) > LEAST_MM else ():
         yield outer.at(way * max(apart, 0.0), way * max(-apart, 0.0)), height, feed, None, 0
     count = math.ceil(half / step - LEAST_MM)
-    refuse_arc_if(count > MOST_LAYERS, "a pocket in too many rings", "a larger step")
+    refuse_if(count > MOST_LAYERS, "a pocket in too many rings", "a larger step")
     for index in range(count - 1, -1, -1):
         ring = outer.grown(-half * index / count)
         yield ring.at(0.0, -ring.width / 2.0), height, feed, None, 0

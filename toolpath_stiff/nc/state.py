@@ -14,8 +14,8 @@ from toolpath_stiff.errors import InputError, ProgramError
 from toolpath_stiff.nc.compensation import RadiusCompensation
 from toolpath_stiff.nc.controller import GENERIC, Dialect
 from toolpath_stiff.nc.elements import Element
-from toolpath_stiff.nc.frames import Frames
-from toolpath_stiff.nc.geometry import ArcError
+from toolpath_stiff.nc.frames import UNIT, Frames, Matrix
+from toolpath_stiff.nc.geometry import GeometryError
 from toolpath_stiff.nc.moves import Move, Recorder, Remark, Unsupported
 from toolpath_stiff.nc.tables import LARGEST_MM, LARGEST_WORD, ToolEntry, tool_of
 from toolpath_stiff.nc.words import AXES, Block, Word
@@ -148,10 +148,10 @@ class CurrentBlock:
 
     @contextmanager
     def placing(self) -> Iterator[None]:
-        """Add the block's place to errors of geometry (`ArcError`)."""
+        """Add the block's place to errors of geometry (`GeometryError`)."""
         try:
             yield
-        except ArcError as error:
+        except GeometryError as error:
             raise self.fail(None, error.found, error.expected) from None
 
     def fail(self, culprit: Word | str | None, problem: str, expected: str = "", hint: str = "") -> InputError:
@@ -164,6 +164,9 @@ class CurrentBlock:
 
 
 START = "before its first move the tool stands at 0, 0, 0 of the control, as LinuxCNC assumes"
+
+
+Values = dict[str, float]  # parameters of a cycle, by their names
 
 
 @dataclass
@@ -225,7 +228,7 @@ class Conversational:
     closes: complex = complex(math.nan, math.nan)
     fast: bool = False
     to_corner: bool = False
-    cycle: tuple[int, dict[str, float]] | None = None
+    cycle: tuple[int, Values] | None = None
     modal: bool = False
     pattern: list[tuple[complex, float]] = field(default_factory=list)
     shift: list[float] = field(default_factory=lambda: [0.0] * 3)
@@ -233,7 +236,7 @@ class Conversational:
     angle: float = 0.0
     mirrored: frozenset[int] = frozenset()
     scale: float = 1.0
-    tilt: list[list[float]] | None = None
+    tilt: Matrix | None = None
     doubt: str = ""
     unknown: set[int] = field(default_factory=set)
     tool_feed: float | None = None
@@ -245,7 +248,7 @@ class Conversational:
     names: dict[str, int] = field(default_factory=dict)
     stock: dict[str, list[float]] = field(default_factory=dict)
     parameters: dict[str, float] = field(default_factory=dict)
-    inner: list[list[float]] = field(default_factory=lambda: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    inner: Matrix = field(default_factory=lambda: [list(row) for row in UNIT])
     renumbered: set[int] = field(default_factory=set)
     side: str = ""
     entry: str = ""
@@ -254,7 +257,7 @@ class Conversational:
     base: str = ""
     contour: list[Element] = field(default_factory=list)
     labels: list[float] = field(default_factory=list)
-    contour_data: dict[str, float] = field(default_factory=dict)
+    contour_data: Values = field(default_factory=dict)
     drawn: Callable[[CurrentBlock, float], tuple[list[Element], int]] | None = None
     offsets_named: bool = False
     changes_by_t: bool = False
@@ -300,6 +303,11 @@ class Record:
         """Add the tool in the spindle to those that moved."""
         if self.tool not in self.used_tools:
             self.used_tools[self.tool] = replace(tool_of(self.tools, self.tool))
+
+    def warn_once(self, sentence: str, line: int) -> None:
+        """Warn of what a line does, unless an earlier one does it too."""
+        if all(remark.text != sentence for remark in self.warnings):
+            self.warnings.append(Remark(sentence, line))
 
     def assume(self, sentence: str) -> None:
         """Note an assumption, once."""

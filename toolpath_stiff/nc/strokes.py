@@ -8,6 +8,7 @@ from toolpath_stiff.nc.moves import CYCLE, RAPID
 FEEDS_OUT = ("G89", "G84", "G74")
 PECK_CLEARANCE_MM = 0.254  # G73, G83: how far above the last depth the rapid ends (0.010 in; LinuxCNC's default)
 SAME_HEIGHT_MM = 1e-9  # a peck that ends at the bottom but for rounding is the last one
+SHIFT = "the shift off the wall before the tool leaves the hole"  # of boring cycles: changes no cut
 MOST_STROKES = 100_000  # in one block; more means a mistaken peck depth or number of repeats
 
 

@@ -20,11 +20,11 @@ def offset_move(state: State, cutter: RadiusCompensation, move: Move, control: l
     """Record the tool centre's path for a programmed move. Returns True if any move was added.
 
     `move`: as programmed, from where the tool centre stands; `control`: its programmed end in control coordinates.
-    Raises `ArcError`.
+    Raises `GeometryError`.
     """
     frames, rows, step = state.frames, len(state.recorder.recent), None
     of_machine, problem = [frames.from_machine[axis] for axis in cutter.axes[:2]], "from machine coordinates"
-    geometry.refuse_arc_if(any(of_machine), f"a move under cutter compensation {problem}", "both words of the plane")
+    geometry.refuse_if(any(of_machine), f"a move under cutter compensation {problem}", "both words of the plane")
     there = frames.to_program(control)
     start, target = cutter.in_plane(frames.to_program(frames.position)), cutter.in_plane(there)
     direction = target - start
@@ -86,10 +86,10 @@ def _add(state: State, cutter: RadiusCompensation, move: Move, end: list[float],
 
 
 def settle(state: State, cutter: RadiusCompensation, to: complex) -> None:
-    """Move the end of the pending moves; raises `ArcError` if the tool would have to go back."""
+    """Move the end of the pending moves; raises `GeometryError` if the tool would have to go back."""
     assert cutter.position is not None
     for pending in cutter.pending:
-        geometry.refuse_arc_if(_gouges(cutter, pending, to), compensation.GOUGE, compensation.SMALLER)
+        geometry.refuse_if(_gouges(cutter, pending, to), compensation.GOUGE, compensation.SMALLER)
         pending.end[:] = cutter.moved(pending.end, to)
         _rewrite(state, cutter, pending)
     cutter.position = cutter.moved(cutter.position, to)

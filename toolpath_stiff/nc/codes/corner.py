@@ -42,7 +42,7 @@ def cut_corner(state: State, block: CurrentBlock, target: list[float]) -> None:
     begin, vertex, end = before.start, frames.to_setup(frames.position), frames.to_setup(target)
     first, second, normal = geometry.PLANES[state.plane]
     points = [frames.to_program(frames.from_setup(point)) for point in (begin, vertex, end)]
-    geometry.refuse_arc_if(
+    geometry.refuse_if(
         any(math.dist(point[3:], vertex[3:]) or abs(point[normal] - points[1][normal]) > SAME_MM for point in points),
         "a corner between moves that do not lie in the plane, or while rotary axes turn",
         "X, Y and Z alone, in the plane",

@@ -187,7 +187,7 @@ def _center(
     clockwise: bool,
     words: dict[int, float],
 ) -> geometry.Point2:
-    """Centre by R, or by the two of I, J, K that belong to the plane. Raises `InputError`, `geometry.ArcError`."""
+    """Centre by R, or by the two of I, J, K that belong to the plane. Raises `InputError`, `geometry.GeometryError`."""
     first, second, normal = geometry.PLANES[state.plane]
     radius = block.take("R")
     off_plane = geometry.CENTER_WORDS[normal]
@@ -196,15 +196,15 @@ def _center(
         block.take(off_plane)  # posts write all three
     block.refuse_if(block.has(off_plane), off_plane, f"is off the plane {state.plane}", " and ".join(sorted(in_plane)))
     offsets = [block.take(letter) for letter in in_plane]
-    geometry.refuse_arc_if(state.polar and offsets != [None, None], "an arc with I, J or K in polar mode (G16)", "R")
+    geometry.refuse_if(state.polar and offsets != [None, None], "an arc with I, J or K in polar mode (G16)", "R")
     if radius is not None:
         block.refuse_if(offsets != [None, None], "R", "and a centre (I, J, K) are both given", "one of them")
         ends = {first, second} & words.keys()
-        geometry.refuse_arc_if(not ends, "an arc with R and without an end point", "an axis word of the plane")
+        geometry.refuse_if(not ends, "an arc with R and without an end point", "an axis word of the plane")
         return geometry.center_from_radius(start, end, radius * state.length_scale, clockwise)
     if offsets == [None, None] or (state.arc_absolute and None in offsets):
         problem = "an arc without a centre, or with one word of an absolute one (G90.1)"
-        raise geometry.ArcError(problem, f"{in_plane[0]} and {in_plane[1]}, or R")
+        raise geometry.GeometryError(problem, f"{in_plane[0]} and {in_plane[1]}, or R")
     a, b = ((offset or 0.0) * state.length_scale for offset in offsets)
     return (a, b) if state.arc_absolute else (start[0] + a, start[1] + b)
 

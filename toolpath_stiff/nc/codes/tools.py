@@ -11,12 +11,27 @@ HOLDS_TIP = "G43.4"  # tool centre point control
 HOLDS_HINT = (
     "post X, Y, Z, A, B, C of the tip, or name the machine it is posted for ([kinematics] of a controller file)"
 )
+FIRST_NAMED = 10_001  # number given to the first tool called by name
 ADD_IT = "add it to the tool table (--tools FILE)"
 
 
 def tool_word(state: State, block: CurrentBlock, code: str) -> None:
     """T: the tool that the next M6 takes."""
     state.selected = int(block.take("T") or 0)
+
+
+def tool_number(state: State, block: CurrentBlock) -> int | None:
+    """Number of the tool in a statement: as given, or by its name in the tool table (or in order of appearance)."""
+    name, value = block.values.get('"'), block.take("#")
+    if block.take('"') is None or name is None:
+        block.refuse_if(value is not None and (value != int(value) or value < 0), "#", "is no tool", "a whole number")
+        return None if value is None else int(value)
+    table = {entry.remark.upper(): number for number, entry in (state.tools or {}).items()}
+    names = state.plain.names
+    number = table.get(name.text) or names.setdefault(name.text, FIRST_NAMED + len(names))
+    if name.text not in table:
+        state.assume(f'the tool "{name.text}" has the number {number} here')
+    return number
 
 
 def change_tool(state: State, block: CurrentBlock, code: str) -> None:

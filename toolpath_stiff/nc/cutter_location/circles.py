@@ -13,7 +13,7 @@ import math
 from dataclasses import dataclass
 
 from toolpath_stiff.nc.elements import meetings
-from toolpath_stiff.nc.geometry import RELATIVE_TOLERANCE, ArcError, Vector, check_bulge, refuse_arc_if
+from toolpath_stiff.nc.geometry import RELATIVE_TOLERANCE, GeometryError, Vector, check_bulge, cross, dot, refuse_if
 from toolpath_stiff.nc.moves import Arc
 from toolpath_stiff.units import MM_PER_INCH
 
@@ -43,16 +43,6 @@ class Circle:
     sweep: float | None = None
 
 
-def dot(a: Vector, b: Vector) -> float:
-    """Scalar product."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def cross(a: Vector, b: Vector) -> Vector:
-    """Vector product."""
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
-
-
 def along(point: Vector, direction: Vector, distance: float) -> Vector:
     """A point moved by a distance."""
     x, y, z = (p + distance * d for p, d in zip(point, direction, strict=True))
@@ -69,13 +59,13 @@ def _in_plane(circle: Circle, start: Vector) -> tuple[Vector, Vector]:
     out = minus(start, circle.center)
     out = along(out, circle.axis, -dot(out, circle.axis))
     length = math.sqrt(dot(out, out))
-    refuse_arc_if(length < SAME_POINT, "a circle whose centre is the tool's position", "a centre apart from it")
+    refuse_if(length < SAME_POINT, "a circle whose centre is the tool's position", "a centre apart from it")
     first = (out[0] / length, out[1] / length, out[2] / length)
     return first, cross(circle.axis, first)
 
 
 def arc_to(circle: Circle, start: Vector, end: Vector) -> Arc:
-    """Arc from start to end. Raises `ArcError` if they do not lie on the circle within its tolerance."""
+    """Arc from start to end. Raises `GeometryError` if they do not lie on the circle within its tolerance."""
     first, second = _in_plane(circle, start)
     from_center, to_end = minus(start, circle.center), minus(end, circle.center)
     radius, there = dot(from_center, first), complex(dot(to_end, first), dot(to_end, second))
@@ -85,10 +75,10 @@ def arc_to(circle: Circle, start: Vector, end: Vector) -> Arc:
         problem = (
             f"an arc whose end lies {abs(last - radius):.4f} mm off its circle (radius {radius:.4f} mm at the start"
         )
-        raise ArcError(f"{problem}, {last:.4f} mm at the end)", expected)
+        raise GeometryError(f"{problem}, {last:.4f} mm at the end)", expected)
     if abs(circle.radius - radius) > allowed:  # never true if the file gives no radius
         problem = f"whose centre lies {radius:.4f} mm from the tool's position"
-        raise ArcError(f"a circle of radius {circle.radius:.4f} mm {problem}", expected)
+        raise GeometryError(f"a circle of radius {circle.radius:.4f} mm {problem}", expected)
     center = along(circle.center, circle.axis, dot(from_center, circle.axis))
     sweep = _sweep(circle, radius, there)
     check_bulge(radius, sweep)
@@ -102,21 +92,21 @@ def _sweep(circle: Circle, here: float, there: complex) -> float:
         angle += math.tau * round((math.radians(circle.sweep) - angle) / math.tau)
         if angle <= 0.0 or abs(math.degrees(angle) - circle.sweep) > SWEEP_TOLERANCE_DEG:
             problem = f"an arc of {math.degrees(angle % math.tau):.3f} degrees where ANGLE says {circle.sweep:g}"
-            raise ArcError(problem, "an end that is that far along the circle")
+            raise GeometryError(problem, "an end that is that far along the circle")
     return angle
 
 
 def turned_as(center: Vector, axis: Vector, start: Vector, direction: Vector) -> Vector:
-    """Axis with the sign for which a motion from the start begins in a direction. Raises `ArcError`."""
+    """Axis with the sign for which a motion from the start begins in a direction. Raises `GeometryError`."""
     tangent = cross(axis, minus(start, center))
     size = math.sqrt(dot(tangent, tangent) * dot(direction, direction))
-    if size < SAME_POINT or abs(dot(tangent, direction)) < 0.5 * size:
-        raise ArcError("a direction (INDIRV) that does not go along the circle", "the tangent at the start")
+    across = size < SAME_POINT or abs(dot(tangent, direction)) < 0.5 * size
+    refuse_if(across, "a direction (INDIRV) that does not go along the circle", "the tangent at the start")
     return axis if dot(tangent, direction) > 0.0 else (-axis[0], -axis[1], -axis[2])
 
 
 def line_meets(circle: Circle, start: Vector, line: tuple[Vector, Vector], which: int) -> Vector:
-    """Point where a motion along the circle meets a line for the first or second time. Raises `ArcError`.
+    """Point where a motion along the circle meets a line for the first or second time. Raises `GeometryError`.
 
     Parameters
     ----------
@@ -130,17 +120,17 @@ def line_meets(circle: Circle, start: Vector, line: tuple[Vector, Vector], which
     first, second = _in_plane(circle, start)
     apart, near = [minus(point, circle.center) for point in line], 10.0 * SAME_POINT_MM
     p, q = (complex(dot(point, first), dot(point, second)) for point in apart)
-    refuse_arc_if(abs(q - p) < SAME_POINT, "a line of no length", "two points")
+    refuse_if(abs(q - p) < SAME_POINT, "a line of no length", "two points")
     radius = dot(minus(start, circle.center), first)
     places = meetings((p, q, None, 0), (complex(radius), complex(radius), 0j, 1))
-    refuse_arc_if(not places, "a line that does not meet its circle", "one that does")
+    refuse_if(not places, "a line that does not meet its circle", "one that does")
     # If the line goes through the start, that is met after a whole turn.
     order = sorted(places, key=lambda place: cmath.phase(place) % math.tau or math.tau)
     order.sort(key=lambda place: abs(place - radius) < near)
     place = order[which - 1]
     if abs(abs(q) - radius) < near < abs(q - place):
         problem = "a line whose second point lies on the circle, where the motion does not end"
-        raise ArcError(problem, "that point at the intersection that is asked for")
+        raise GeometryError(problem, "that point at the intersection that is asked for")
     rise = dot(minus(start, circle.center), circle.axis)
     flat = along(along(circle.center, first, place.real), second, place.imag)
     return along(flat, circle.axis, rise)

@@ -5,8 +5,8 @@ import math
 from toolpath_stiff.nc.cutter_location.circles import VERTICAL
 from toolpath_stiff.nc.cutter_location.state import CutterLocationState
 from toolpath_stiff.nc.cutter_location.statements import MajorStatement, is_number
-from toolpath_stiff.nc.cutter_location.tool_axes import unit_axis
 from toolpath_stiff.nc.tables import ToolEntry, tool_of
+from toolpath_stiff.nc.tool_axes import unit_axis
 from toolpath_stiff.units import MM_PER_INCH, SECONDS_PER_DAY, SECONDS_PER_MINUTE
 
 MM_PER_FOOT = 12.0 * MM_PER_INCH

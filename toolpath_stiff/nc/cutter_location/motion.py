@@ -7,9 +7,9 @@ from toolpath_stiff.nc.cutter_location import circles
 from toolpath_stiff.nc.cutter_location.circles import VERTICAL, Circle
 from toolpath_stiff.nc.cutter_location.state import CutterLocationState, drill, move, stand
 from toolpath_stiff.nc.cutter_location.statements import MajorStatement, is_number, number
-from toolpath_stiff.nc.cutter_location.tool_axes import angle_of, unit_axis
-from toolpath_stiff.nc.geometry import Vector
+from toolpath_stiff.nc.geometry import Vector, cross
 from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Remark
+from toolpath_stiff.nc.tool_axes import angle_of, unit_axis
 
 HOME = "home is the control's: the way there is not part of the path"
 CIRCLE_AXIS = "a circle's axis"
@@ -154,7 +154,7 @@ def _await_circle(state: CutterLocationState, numbers: list[float], sweep: float
     state.circle = Circle(center, axis, radius * state.scale, state.statement.line, sweep)
     state.swept = 0.0
     # A straight move enters the arc smoothly, as it nearly always does, or would turn back.
-    tangent = circles.cross(axis, circles.minus(state.point, center))
+    tangent = cross(axis, circles.minus(state.point, center))
     angle = angle_of(tangent, state.heading) if state.heading is not None else math.nan
     state.smooth += angle < circles.SMOOTH_DEG
     if angle > 180.0 - circles.SMOOTH_DEG:

@@ -17,7 +17,7 @@ from toolpath_stiff.nc.cutter_location.motion import to_point
 from toolpath_stiff.nc.cutter_location.state import CutterLocationState
 from toolpath_stiff.nc.cutter_location.statements import MajorStatement, frame_in_comment, plain_point, read_statement
 from toolpath_stiff.nc.cutter_location.vocabulary import execute, meaning_of
-from toolpath_stiff.nc.geometry import ArcError
+from toolpath_stiff.nc.geometry import GeometryError
 from toolpath_stiff.nc.languages import any_statement
 from toolpath_stiff.nc.moves import CUTTER_LOCATION, PACKED_AT, ReadProgram, Remark
 from toolpath_stiff.nc.program_run import ProgramRun
@@ -112,7 +112,7 @@ class CutterLocationRun(ProgramRun):
                 execute(state, statement)
             else:
                 to_point(state, point)
-        except ArcError as error:
+        except GeometryError as error:
             raise state.fail(error.found, error.expected) from None
         state.last_word = word or state.last_word
 

@@ -1,7 +1,7 @@
 """State of a cutter-location file being read, and the moves of the tool tip that its words record.
 
 Moves go straight, along circles and into holes, with the tool axis turning meanwhile; they begin where the tool stands
-and belong to the line of the statement being executed. They raise `AxisError` and `ArcError`, which know no line, and
+and belong to the line of the statement being executed. They raise `GeometryError`, which knows no line, and
 `InputError`, which does. mm, degrees, mm/min.
 """
 
@@ -10,15 +10,15 @@ from dataclasses import dataclass, field, replace
 
 from toolpath_stiff.errors import ProgramError
 from toolpath_stiff.nc.courses import point_on_arc
-from toolpath_stiff.nc.cutter_location.circles import VERTICAL, Circle, along, dot, minus
+from toolpath_stiff.nc.cutter_location.circles import VERTICAL, Circle, along, minus
 from toolpath_stiff.nc.cutter_location.statements import MajorStatement, is_number, number
-from toolpath_stiff.nc.cutter_location.tool_axes import angles_near, division, on_great_circle
-from toolpath_stiff.nc.geometry import Vector
+from toolpath_stiff.nc.geometry import Vector, dot
 from toolpath_stiff.nc.moves import RAPID, Arc, Move, Remark, Unsupported
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.state import Record
 from toolpath_stiff.nc.strokes import Drilling, strokes
 from toolpath_stiff.nc.tables import LARGEST_MM, tool_of
+from toolpath_stiff.nc.tool_axes import angles_near, division, on_great_circle
 
 FIRST_POINT = "the path begins at the file's first point; the start position of the tool is not given (no FROM)"
 FREE_YAW = "the turn of the tool about its own axis (yaw) is free in a cutter-location file; it is 0"

@@ -192,7 +192,7 @@ def meaning_of(name: str) -> str:
 
 
 def execute(state: CutterLocationState, statement: MajorStatement) -> None:
-    """Execute a statement. Raises `InputError` and `ArcError`.
+    """Execute a statement. Raises `InputError` and `GeometryError`.
 
     A word that is not known is listed with a warning, and refused where it may move the tool or belong to another
     language.

@@ -10,9 +10,9 @@ import math
 from functools import partial
 
 from toolpath_stiff.nc.codes.cutter import switch_off
+from toolpath_stiff.nc.contouring.contour import SIDES, Circle, begin_compensation, go, take_side
+from toolpath_stiff.nc.contouring.points import feed, in_plane, named, plane_of_pole, polar, present
 from toolpath_stiff.nc.geometry import PLANES
-from toolpath_stiff.nc.heidenhain.contour import SIDES, Circle, begin_compensation, go, take_side
-from toolpath_stiff.nc.heidenhain.points import feed, in_plane, named, plane_of_pole, polar, present
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES
 

@@ -7,41 +7,17 @@ one, moves are refused. mm, degrees.
 """
 
 from toolpath_stiff.nc.codes import tools
-from toolpath_stiff.nc.codes.motion import record
-from toolpath_stiff.nc.frames import rotate, rotation_matrix
-from toolpath_stiff.nc.geometry import PLANES, roll_pitch_of_axis
-from toolpath_stiff.nc.heidenhain.points import outside_contour
-from toolpath_stiff.nc.moves import RAPID
+from toolpath_stiff.nc.contouring.tilting import put, turn_tool
+from toolpath_stiff.nc.frames import UNIT, product, rotation_matrix
+from toolpath_stiff.nc.geometry import PLANES
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES
 
-Matrix = list[list[float]]
-UNIT: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
-TIP_TURNS = (
-    "PLANE, cycle 19 and CYCLE800 turn the tool about its tip where it stands: how the machine's axes turn is not known"
-)
 HOW_AXES_TURN = (
     "STAY", "MOVE", "TURN", "F", "FMAX", "SEQ+", "SEQ-", "SYM+", "SYM-", "DIST", "ABST", "MB", "MBMAX", "TABLEROT",
     "COORDROT",
 )  # fmt: skip
 SPATIAL = "the angles of cycle 19 are spatial angles, not positions of the machine's axes"
-
-
-def product(a: Matrix, b: Matrix) -> Matrix:
-    """Matrix product."""
-    return [[sum(x * y for x, y in zip(row, column, strict=True)) for column in zip(*b, strict=True)] for row in a]
-
-
-def put(state: State, block: CurrentBlock, inner: Matrix) -> None:
-    """Put a rotation, mirror image and scale, the tilting and the shifts in force; the tool does not move."""
-    plain, frames = state.plain, state.frames
-    outside_contour(state, block, "changes coordinates", state.beside is not None or plain.side)
-    whole, shift = inner, plain.shift
-    if plain.tilt is not None:
-        whole, shift = product(plain.tilt, inner), rotate(plain.tilt, plain.shift)
-    frames.linear = None if whole == UNIT else whole
-    frames.g92 = [*(a + b for a, b in zip(plain.outer, shift, strict=True)), 0.0, 0.0, 0.0]
-    plain.pole = plain.heading = None
 
 
 def apply(state: State, block: CurrentBlock) -> None:
@@ -135,15 +111,6 @@ def tilt(state: State, block: CurrentBlock, code: str) -> None:
         plain.outer, plain.shift = [0.0] * 3, plain.outer
     apply(state, block)
     turn_tool(state, block)
-
-
-def turn_tool(state: State, block: CurrentBlock) -> None:
-    """Turn the tool upright on the tilted plane, after which the position of its tip is unknown."""
-    plain = state.plain
-    axis = [row[2] for row in plain.tilt] if plain.tilt is not None else [0.0, 0.0, 1.0]
-    state.assume(TIP_TURNS)
-    record(state, block, RAPID, [*state.frames.position[:3], *roll_pitch_of_axis(*axis), 0.0], (3, 4, 5))
-    plain.unknown |= {0, 1, 2}
 
 
 def datum(state: State, block: CurrentBlock, code: str) -> None:

@@ -5,24 +5,18 @@ HEIDENHAIN, user's manual "Cycles" of the iTNC 530 and the TNC 640, "Fixed cycle
 mm/min, dwells s; a stroke without a feed is a rapid.
 """
 
-import cmath
 import math
 import re
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 
-from toolpath_stiff.nc.codes.motion import record_strokes
-from toolpath_stiff.nc.geometry import PLANES
-from toolpath_stiff.nc.heidenhain.contour import check_known, direction, go
+from toolpath_stiff.nc.contouring.contour import Stroke, check_known, go, plunge, turn_of
+from toolpath_stiff.nc.contouring.points import feed, inch_tenths, named, outside_contour, present
+from toolpath_stiff.nc.geometry import PLANES, turned
 from toolpath_stiff.nc.heidenhain.milling import AUTO, MAX, MILLED, mill_form
-from toolpath_stiff.nc.heidenhain.points import feed, inch_tenths, named, outside_contour, present
-from toolpath_stiff.nc.moves import CYCLE, RAPID
-from toolpath_stiff.nc.state import CurrentBlock, State
-from toolpath_stiff.nc.strokes import MOST_STROKES, SAME_HEIGHT_MM
+from toolpath_stiff.nc.state import CurrentBlock, State, Values
+from toolpath_stiff.nc.strokes import MOST_STROKES, SAME_HEIGHT_MM, SHIFT
 from toolpath_stiff.units import SECONDS_PER_DAY
-
-Values = dict[str, float]
-Stroke = tuple[float, float | None, float]  # height, feed, dwell after it
 
 _ALL, _DRILL = ("Q200", "Q201", "Q203"), ("Q200", "Q201", "Q206", "Q203")
 CONTOURS = {
@@ -56,7 +50,6 @@ FORMS = {"POS": "X Y", "ROW": "X Y D NUM", "PAT": "X Y DX DY NUMX NUMY", "CIRC":
          "PITCHCIRC": "X Y D NUM STEP"}  # fmt: skip
 UNASKED = {"Z", "ROT", "ROTX", "ROTY", "START"}  # words of PATTERN DEF that may be missing: 0
 _FORM = re.compile(rf"({'|'.join(FORMS)})\d+\s*\(([^)]*)\)")
-HAVE_NO_SHIFT = "the shift off the wall before the tool leaves the hole"
 
 
 def define(state: State, block: CurrentBlock, code: str) -> None:
@@ -77,7 +70,7 @@ def define(state: State, block: CurrentBlock, code: str) -> None:
     if number not in CONTOURS:
         _check(block, number, values)
     if values.get("Q214"):
-        state.note(block.line, block.values["Q214"], HAVE_NO_SHIFT)
+        state.note(block.line, block.values["Q214"], SHIFT)
     plain.cycle, plain.modal = (number, values), False
 
 
@@ -91,7 +84,7 @@ def define_older(state: State, block: CurrentBlock, code: str) -> None:
         state.plain.cycle, state.plain.modal = (number, {}), False
         return
     if block.has("DR+") or block.has("DR-"):
-        values["Q351"] = direction(block)
+        values["Q351"] = turn_of(block)
     for word, name in ((item[0], item[1:]) for item in names[int(part) - 1].split()):
         value = block.take(word)
         if value is not None:
@@ -160,13 +153,6 @@ def call(state: State, block: CurrentBlock, change: Values | None = None) -> Non
     plunge(state, block, ((at * unit, feeds.get(rate, (rate or 0.0) * pitch), wait) for at, rate, wait in path))
 
 
-def plunge(state: State, block: CurrentBlock, path: Iterable[Stroke]) -> None:
-    """Carry out strokes at the present point, in mm and mm/min; a feed of 0 means that none was given."""
-    modal, moves = state.feed, ((height, RAPID if rate is None else CYCLE, rate, wait) for height, rate, wait in path)
-    record_strokes(state, block, PLANES[state.plane][2], moves, SAME_HEIGHT_MM)
-    state.feed, state.plain.heading = modal, None
-
-
 def strokes(number: int, values: Values, speed: float) -> Iterator[Stroke]:
     """Heights of a hole one after another, each with its feed and the dwell there.
 
@@ -228,7 +214,7 @@ def _pattern(state: State, block: CurrentBlock, number: int, values: Values) -> 
         places = _circle(complex(values["Q216"], values["Q217"]), count, values["Q244"], first, step)
     else:
         columns, rows = (_count(block, values[name]) for name in ("Q242", "Q243"))
-        along, across = values["Q237"] * _turned(values["Q224"]), values["Q238"] * 1j * _turned(values["Q224"])
+        along, across = values["Q237"] * turned(values["Q224"]), values["Q238"] * 1j * turned(values["Q224"])
         places = _lines(complex(values["Q225"], values["Q226"]), columns, rows, along, across, to_and_fro=True)
     change: Values = {name: values[name] for name in ("Q200", "Q203", "Q204") if name in values}
     _visit(state, block, [(place, 0.0) for place in places], change, far=bool(values.get("Q301", 1.0)))
@@ -261,7 +247,7 @@ def pattern(state: State, block: CurrentBlock, text: str, number: Callable[[str]
         block.refuse_if(wrong or _WORD.sub("", words).strip(), None, f"{kind} with other words", FORMS[kind])
         here = complex(v["X"] if "X" in v else here.real + v["IX"], v["Y"] if "Y" in v else here.imag + v["IY"])
         count, rows = (_count(block, value or 1.0) for value in (v["NUMX"] or v["NUM"], v["NUMY"]))
-        along, across = _turned(v["ROT"] + v["ROTX"], v["DX"] or v["D"]), 1j * _turned(v["ROT"] + v["ROTY"], v["DY"])
+        along, across = turned(v["ROT"] + v["ROTX"], v["DX"] or v["D"]), 1j * turned(v["ROT"] + v["ROTY"], v["DY"])
         circle = _circle(here, count, v["D"], v["START"], v["STEP"] or 360.0 / count)
         places = circle if "CIRC" in kind else _lines(here, count, rows, along, across)
         points += [(place, v["Z"]) for place in places]
@@ -277,12 +263,8 @@ def _count(block: CurrentBlock, value: float) -> int:
     return int(value)
 
 
-def _turned(degrees: float, size: float = 1.0) -> complex:
-    return cmath.rect(size, math.radians(degrees))
-
-
 def _circle(middle: complex, count: int, diameter: float, first: float, step: float) -> list[complex]:
-    return [middle + _turned(first + index * step, diameter / 2.0) for index in range(count)]
+    return [middle + turned(first + index * step, diameter / 2.0) for index in range(count)]
 
 
 def _lines(

@@ -7,14 +7,13 @@ two squares, ANG the angle of two sides from 0 to 360 degrees; angles are in deg
 
 import math
 import re
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable
 from operator import truediv
 from typing import ClassVar
 
-from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.heidenhain.statements import NUMBER
-from toolpath_stiff.nc.parametric.expressions import ARITHMETIC, Scanner
+from toolpath_stiff.nc.parametric.expressions import ARITHMETIC
+from toolpath_stiff.nc.parametric.formulas import COMMON, Formula, Value, simple_pattern, trimmed, whole
 from toolpath_stiff.nc.place import Place
 
 PARAMETER = re.compile(r"Q[LR]?\d+")
@@ -23,37 +22,10 @@ _JUMP = re.compile(r'\s*IF\s*(.+?)\s*(EQU|NE|GT|LT)\s*(.+?)\s*GOTO\s*LBL\s*(?:(\
 CONDITIONS = {"FN9": "EQU", "FN10": "NE", "FN11": "GT", "FN12": "LT"}
 EQUAL = 1e-9
 KNOWN = "numbers, Q parameters, functions, + - * / ^ ( )"
-Value = float | str  # a truth value is a bool, which is a number
-_TERM = re.compile(r"\s*([-+*/]?)\s*(?:([A-Z]\w*)|([\d.,]+))", re.ASCII)
-Lookup = Callable[[str, int], Value]  # the value of a variable, and the column where it stands
-LONGEST_BLOCK, MOST_BRACKETS = 512, 60  # characters (SIEMENS, Fundamentals, "Blocks and block format")
-
-
-def whole(value: float) -> float:
-    """Value without its fraction."""
-    return float(math.trunc(value))
-
-
-def trimmed(degrees: float) -> float:
-    """Value without noise beyond the digits of a control: SIN 180 is 0."""
-    return float(f"{degrees:.12g}") if abs(degrees) > 1e-14 else 0.0
-
-
-COMMON: dict[str, Callable[..., float]] = {
-    "SIN": lambda v: trimmed(math.sin(math.radians(v))), "COS": lambda v: trimmed(math.cos(math.radians(v))),
-    "TAN": lambda v: math.tan(math.radians(v)), "ASIN": lambda v: trimmed(math.degrees(math.asin(v))),
-    "ACOS": lambda v: trimmed(math.degrees(math.acos(v))), "SQRT": math.sqrt, "LN": math.log, "EXP": math.exp,
-    "ABS": abs,
-}  # fmt: skip
 FUNCTIONS: dict[str, Callable[..., float]] = {
     **COMMON, "ATAN": lambda v: trimmed(math.degrees(math.atan(v))), "SQ": lambda v: v * v, "LOG": math.log10,
     "NEG": lambda v: -v, "INT": whole, "FRAC": lambda v: v - whole(v), "SGN": lambda v: float((v > 0) - (v < 0)),
 }  # fmt: skip
-
-
-def simple_pattern(part: str, others: str) -> re.Pattern[str]:
-    """Pattern of a sum of products of `part`, numbers and variables, that none of the other operators follows."""
-    return re.compile(rf"\s*[-+]?\s*{part}(?:\s*[-+*/]\s*{part})*(?!\s*(?:[-+*/(\[]|{others})|[\w.$])", re.ASCII)
 
 
 def assigned(head: str, rest: str, place: Place) -> tuple[str, str, Place]:
@@ -78,125 +50,25 @@ def condition(
     return holds[jump[2]], jump[4], jump[5]
 
 
-@dataclass
-class Formula(Scanner):
-    """A block in upper case without its comment; blanks between its parts are skipped. `lookup`: variables."""
-
-    lookup: Lookup = field(kw_only=True)
+class PlainFormula(Formula):
+    """A formula of Q parameters."""
 
     literal: ClassVar = re.compile(NUMBER)
     operator: ClassVar = re.compile(r"DIV|LEN|ANG|[-+*/^]")
     name: ClassVar = re.compile(rf"{PARAMETER.pattern}|[A-Z]+")
-    # How tightly an operator binds.
-    ranks: ClassVar[Mapping[str, int]] = {"+": 1, "-": 1, "LEN": 1, "ANG": 1, "*": 2, "/": 2, "DIV": 2, "^": 3}
-    operations: ClassVar[Mapping[str, Callable[[float, float], float]]] = {
+    simple: ClassVar = simple_pattern(rf"(?:{PARAMETER.pattern}|{NUMBER})", r"[,^]|DIV|LEN|ANG")
+    ranks: ClassVar = {"+": 1, "-": 1, "LEN": 1, "ANG": 1, "*": 2, "/": 2, "DIV": 2, "^": 3}
+    operations: ClassVar = {
         **ARITHMETIC, "DIV": truediv, "^": math.pow, "LEN": math.hypot,
         "ANG": lambda a, b: trimmed(math.degrees(math.atan2(a, b)) % 360.0),
     }  # fmt: skip
 
-    # A sum of products of numbers and variables, to its end.
-    simple: ClassVar = simple_pattern(rf"(?:{PARAMETER.pattern}|{NUMBER})", r"[,^]|DIV|LEN|ANG")
-
-    def __post_init__(self) -> None:
-        problem = f"a block of {len(self.text)} characters, or with too many brackets"
-        long = len(self.text) > LONGEST_BLOCK or self.text.count("(") > MOST_BRACKETS
-        self.refuse_if(long, problem, f"at most {LONGEST_BLOCK}, {MOST_BRACKETS} of them")
-
-    def part(self, pattern: re.Pattern[str]) -> str:
-        """Next text that matches, after blanks; it is then read."""
-        self.blanks()
-        return self.take(pattern)
-
-    def sign(self, text: str) -> bool:
-        """True if `text` comes next, after blanks; it is then read."""
-        self.blanks()
-        return self.next(text)
-
-    def blanks(self) -> None:
-        """Read blanks, if any come next."""
-        text, position = self.text, self.position
-        while text[position : position + 1].isspace():
-            position += 1
-        self.position = position
-
-    def result(self, tightest: int = 0) -> Value:
-        """Value of operands and operators that bind tighter than `tightest`."""
-        simple = self.simple.match(self.text, self.position) if tightest < self.ranks["+"] else None
-        if simple is not None and (known := self._sum(simple[0])) is not None:
-            self.position = simple.end()
-            return known
-        left = self.operand()
-        while True:
-            begin = self.position
-            operator = self.part(self.operator)
-            if self.ranks.get(operator, 0) <= tightest:
-                self.position = begin
-                return left
-            left = self.operated(operator, left, self.result(self.ranks[operator]), self.column_of(begin))
-
-    def _sum(self, text: str) -> float | None:
-        """Value of an expression that `simple` matches; None: for `result`, which has its errors."""
-        total = product = -0.0  # which changes no number that it is added to
-        try:
-            for operator, name, literal in _TERM.findall(text):
-                value = float(literal.replace(",", ".")) if literal else self.lookup(name, self.column)
-                if type(value) is not float:
-                    return None
-                if operator in ("*", "/"):
-                    product = product * value if operator == "*" else product / value
-                else:
-                    total, product = total + product, -value if operator == "-" else value
-        except (ArithmeticError, InputError):
-            return None
-        total += product
-        return total if math.isfinite(total) else None
-
-    def real(self) -> float:
-        """A number. Raises `InputError` if the value is none."""
-        column = self.column
-        return float(self.number(self.result(), column))
-
-    def operand(self) -> Value:
-        """A value with its sign: a number, an expression in brackets, or a named value."""
-        self.blanks()
-        begin = self.position
-        if self.next("+"):
-            self.blanks()
-        literal = self.take(self.literal)
-        if literal:
-            return float(literal.replace("EX", "E").replace(",", "."))
-        column = self.column_of(begin)
-        name = self.take(self.name)
-        if name:
-            return self.named(name, column)
-        if self.next("("):
-            value = self.result()
-            self.refuse_if(not self.sign(")"), "a bracket that is not closed", ")", column=column)
-            return value
-        if self.next("-"):
-            self.refuse_if(self.begins("-"), "a sign after a sign", "brackets")
-            value = -self.number(self.operand(), column)
-            self.refuse_if(self.sign("^"), "a sign before ^, which may belong to either", "brackets", column=column)
-            return value
-        raise self.fail(f"{self.rest()} is not a value", "a value", column=column)
-
     def named(self, name: str, column: int) -> Value:
-        """Value of a name with what belongs to it: of a function, of a Q parameter."""
+        """Value of a function, of PI, of a Q parameter."""
         if name in FUNCTIONS:
             return self.finite(name, column, FUNCTIONS[name], self.operand())
         self.refuse_if(name != "PI" and not PARAMETER.fullmatch(name), f"{name} in a formula", KNOWN, column=column)
-        return math.pi if name == "PI" else self.lookup(name, column)
-
-    def operated(self, operator: str, left: Value, right: Value, column: int) -> Value:
-        """Result of an operator."""
-        values = self.number(left, column), self.number(right, column)
-        return self.finite(operator, column, self.operations[operator], *values)
-
-    def number(self, value: Value, column: int) -> float:
-        """Numeric value."""
-        if isinstance(value, str):
-            raise self.fail(f"{value!r} is no number", "a number", column=column)
-        return value
+        return math.pi if name == "PI" else super().named(name, column)
 
 
 def work_out(text: str, parameter: Callable[[str], float], place: Place) -> float:
@@ -210,7 +82,7 @@ def work_out(text: str, parameter: Callable[[str], float], place: Place) -> floa
     10.0
     """
     begin = place.column or 1
-    scanner = Formula(text, range(begin, begin + len(text) + 1), place, "", lookup=lambda name, _: parameter(name))
+    scanner = PlainFormula(text, range(begin, begin + len(text) + 1), place, "", lookup=lambda name, _: parameter(name))
     value = scanner.real()
     scanner.blanks()
     scanner.refuse_if(not scanner.done, f"{scanner.rest()} in a formula", KNOWN)

@@ -1,4 +1,4 @@
-"""Free contour programming (FK): lines and arcs whose ends follow from what they and the next elements give. mm.
+"""Corners (CHF, RND); free contours (FK), whose ends follow from what their elements and the next ones give. mm.
 
 HEIDENHAIN, user's manual of the iTNC 530, "Path contours: FK free contour programming". An element waits until it is
 determined. Circles have a direction (radius positive counter-clockwise), so that two of them, a circle and a line, or a
@@ -11,16 +11,15 @@ import math
 from collections import defaultdict
 from dataclasses import dataclass
 
-from toolpath_stiff.nc.geometry import PLANES
-from toolpath_stiff.nc.heidenhain.contour import arc_to, compensate, corner, direction, go
-from toolpath_stiff.nc.heidenhain.points import FREE_POLE, ON_CIRCLE_MM, feed, in_plane, present
+from toolpath_stiff.nc.contouring.contour import arc_to, compensate, go, turn_of
+from toolpath_stiff.nc.contouring.points import FREE_POLE, ON_CIRCLE_MM, feed, in_plane, inch_tenths, present
+from toolpath_stiff.nc.geometry import NOWHERE, PLANES, turned
 from toolpath_stiff.nc.state import CurrentBlock, State
-from toolpath_stiff.nc.words import AXES
+from toolpath_stiff.nc.words import AXES, Word
 
 CORNERS, FREE = ("RND", "CHF"), ("FL", "FLT", "FC", "FCT")
 ANGLES = {"PA", "CCPA", "AN", "IAN", "CCA"}
 WORDS = {"PR", "CCPR", "R", "LEN", "CLSD+", "CLSD-", "DR+", "DR-", "R0", "RL", "RR", "F", "FMAX", "FAUTO"}
-NOWHERE = complex(math.nan, math.nan)
 SAME_DIRECTION = 1e-3  # rad: data that say twice how an element begins may differ by rounding
 NOT_DETERMINED = "is not determined by its own data and those of the elements behind it, or has several solutions"
 Curve = tuple[complex, complex | float]  # a point and the direction of a line; centre and radius with its sign
@@ -55,6 +54,18 @@ def rounding(state: State, block: CurrentBlock, code: str) -> None:
         corner(state, block, code)
 
 
+def corner(state: State, block: CurrentBlock, code: str) -> None:
+    """CHF, RND: cut off or round the corner between the contour elements before and after."""
+    block.refuse_if(state.plain.held is None, None, "without a contour element before it", "L, C, CR or CT before it")
+    size = block.take("#") if code == "CHF" and block.has("#") else block.take("R")
+    rate = block.take("F")
+    if rate is not None:  # holds only for the corner
+        block.values["F alone"] = Word("F", rate * inch_tenths(state), 1, "F")
+    block.refuse_if(not size or size < 0.0, None, "without its size", "RND R5, CHF 2")
+    block.values["size"] = Word("R", (size or 0.0) * state.length_scale, 1, "R")
+    state.plain.corner = block
+
+
 def free_element(state: State, block: CurrentBlock, code: str) -> None:
     """FL, FLT, FC, FCT: make the elements that are determined now."""
     plain, (first, second, _) = state.plain, PLANES[state.plane]
@@ -78,7 +89,7 @@ def free_element(state: State, block: CurrentBlock, code: str) -> None:
         del plain.free[0]
         plain.to_corner, there = to_corner, {first: end.real, second: end.imag}
         if known[0].turn:
-            arc_to(state, block, there, (center, direction(block), 1))
+            arc_to(state, block, there, (center, turn_of(block), 1))
         else:
             rapid = feed(state, block)
             compensate(state, block, there)
@@ -93,17 +104,13 @@ def _known(state: State, block: CurrentBlock, code: str, start: complex) -> Free
     pole = plain.pole[1] if plain.pole and plain.pole[0] == FREE_POLE else NOWHERE
     if "CLSD+" in v and not cmath.isnan(start):
         plain.closes = start
-    end = _first(complex(v[x], v[y]), pole + _turned(v["PA"], v["PR"]), start + complex(v[f"I{x}"], v[f"I{y}"]))
-    center = _first(complex(v[f"CC{x}"], v[f"CC{y}"]), pole + _turned(v["CCPA"], v["CCPR"]))
+    end = _first(complex(v[x], v[y]), pole + turned(v["PA"], v["PR"]), start + complex(v[f"I{x}"], v[f"I{y}"]))
+    center = _first(complex(v[f"CC{x}"], v[f"CC{y}"]), pole + turned(v["CCPA"], v["CCPR"]))
     end = plain.closes if "CLSD-" in v else end
     before = plain.heading if "IAN" in v and not cmath.isnan(start) else None
-    ahead = before * _turned(v["IAN"]) if before else _turned(v["AN"]) if "AN" in v else None
+    ahead = before * turned(v["IAN"]) if before else turned(v["AN"]) if "AN" in v else None
     turn = 0 if code in ("FL", "FLT") else 1 if "DR+" in v else -1
     return FreeElement(code[-1] == "T", turn, turn * (v["R"] or math.nan), center, end, ahead, v["LEN"], v["CCA"])
-
-
-def _turned(degrees: float, size: float = 1.0) -> complex:
-    return NOWHERE if math.isnan(degrees + size) else cmath.rect(size, math.radians(degrees))
 
 
 def _first(*places: complex) -> complex:
@@ -161,7 +168,7 @@ def _solved(
     if not cmath.isnan(end):
         pass
     elif this.turn and this.angle > 0.0:
-        found = center + (start - center) * _turned(this.turn * this.angle)
+        found = center + (start - center) * turned(this.turn * this.angle)
     elif not this.turn and ahead and (shares or this.length > 0.0):
         found = start + ahead * [*shares, this.length][0]
     elif after and not this.turn and not after.turn and ahead and after.ahead and after.curve:

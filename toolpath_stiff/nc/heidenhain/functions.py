@@ -1,17 +1,14 @@
-"""Miscellaneous functions (M) of Heidenhain's controls, tool vectors (LN), and statements that change no path.
+"""Miscellaneous functions (M) of Heidenhain's controls, and statements that change no path.
 
-HEIDENHAIN, user's manual of the iTNC 530, "Programming: miscellaneous functions", "Three-dimensional compensation".
+HEIDENHAIN, user's manual of the iTNC 530, "Programming: miscellaneous functions".
 """
-
-import math
 
 from toolpath_stiff.nc.codes.feeds import feed_mode
 from toolpath_stiff.nc.codes.registry import CODES
-from toolpath_stiff.nc.cutter_location.tool_axes import angles_near, division, on_great_circle, unit_axis
-from toolpath_stiff.nc.geometry import PLANES, Vector
-from toolpath_stiff.nc.heidenhain.contour import compensate, go
+from toolpath_stiff.nc.contouring.contour import go
+from toolpath_stiff.nc.contouring.points import feed, present
+from toolpath_stiff.nc.geometry import PLANES
 from toolpath_stiff.nc.heidenhain.coordinates import hold_tip
-from toolpath_stiff.nc.heidenhain.points import feed, named, present
 from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES
@@ -83,45 +80,12 @@ def retract(state: State, block: CurrentBlock) -> None:
     leans = state.plain.tilt is None and any(state.frames.position[3:5])
     if distance is None:
         block.refuse_if(block.take("MBMAX") is None, "M140", "without its distance", "MB50 or MB MAX")
-        if RETRACT not in [remark.text for remark in state.warnings]:
-            state.warnings.append(Remark(RETRACT, block.line))
+        state.warn_once(RETRACT, block.line)
         state.plain.unknown |= {0, 1, 2} if leans else {normal}
         return
     block.refuse_if(leans, "M140", "along a tool that leans", "X, Y and Z in an L statement")
     there = present(state)[normal] + distance * state.length_scale
     go(state, block, {normal: there}, rapid=rapid or not feed_given)
-
-
-def vectors(state: State, block: CurrentBlock, code: str) -> None:
-    """LN: straight to a point, with the tool's axis TX TY TZ; normals alone change nothing without compensation."""
-    there, rapid = named(state, block), feed(state, block)
-    normal, axis = ([block.take(f"{kind}{letter}") for letter in "XYZ"] for kind in "NT")
-    block.refuse_if(block.has("RL") or block.has("RR"), None, "LN with compensation by the radius", "R0")
-    compensate(state, block, there)
-    if all(component is None for component in axis):
-        turned = state.plain.held_tip and normal != [None] * 3 and state.frames.posted is None
-        block.refuse_if(turned, None, "LN with normals under M128, where the tool may follow them", "TX, TY, TZ")
-        go(state, block, there, rapid=rapid)
-        return
-    other = state.frames.posted is not None or state.plain.tilt is not None or there.keys() & {3, 4, 5} or None in axis
-    block.refuse_if(other, None, "LN with A, B, C, in a tilted plane, or beside [kinematics]", "TX, TY and TZ alone")
-    target = unit_axis([component or 0.0 for component in axis])
-    start, here = _axis(state), present(state)
-    parts = division(start, target)
-    held, state.plain.held_tip = state.plain.held_tip, False  # the vectors themselves state what M128 would hold
-    for part in range(1, parts + 1):
-        share = part / parts
-        at_part = {i: here[i] + share * (there[i] - here[i]) for i in there} if part < parts else dict(there)
-        leaning = target if part == parts else on_great_circle(start, target, share)
-        roll, pitch = angles_near(leaning, (state.frames.position[3], state.frames.position[4]))
-        go(state, block, at_part | {3: roll, 4: pitch, 5: 0.0}, rapid=rapid)
-    state.plain.held_tip, state.plain.led_to = held, state.frames.position[3:]
-
-
-def _axis(state: State) -> Vector:
-    """Axis of the tool, from roll and pitch."""
-    roll, pitch = (math.radians(v) for v in state.frames.position[3:5])
-    return (math.sin(pitch) * math.cos(roll), -math.sin(roll), math.cos(pitch) * math.cos(roll))
 
 
 def dwell(state: State, block: CurrentBlock, code: str) -> None:

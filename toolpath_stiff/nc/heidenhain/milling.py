@@ -10,14 +10,12 @@ from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import replace
 
+from toolpath_stiff.nc.contouring.contour import mill, tool_radius
+from toolpath_stiff.nc.contouring.points import in_plane, inch_tenths, present
 from toolpath_stiff.nc.geometry import PLANES
-from toolpath_stiff.nc.heidenhain.contour import mill, tool_radius
-from toolpath_stiff.nc.heidenhain.points import in_plane, inch_tenths, present
-from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.pockets import LEAST_MM, Cut, Feeds, Outline, edge, pocket, sink
-from toolpath_stiff.nc.state import CurrentBlock, State
+from toolpath_stiff.nc.state import CurrentBlock, State, Values
 
-Values = dict[str, float]
 MAX, AUTO = -1.0, -2.0  # FMAX and FAUTO as values of a parameter
 _ALL = ("Q200", "Q201", "Q203", "Q202", "Q206", "Q207")
 MILLED = {
@@ -63,7 +61,7 @@ def mill_form(state: State, block: CurrentBlock, number: int, values: Values) ->
         block.refuse_if(wrong, name, problem, expected)
     if not radius:  # in a check, behind the error that it is not known
         return
-    note_inside(state, block)
+    state.warn_once(INSIDE, block.line)
     known = {MAX: None, AUTO: state.plain.tool_feed or 0.0}
     down, feed, fine = (known.get(given[name], given[name] * tenths) for name in ("Q206", "Q207", "Q385"))
     turn = (1 if given["Q351"] >= 0.0 else -1) * (-1 if stud else 1)
@@ -73,12 +71,6 @@ def mill_form(state: State, block: CurrentBlock, number: int, values: Values) ->
     cuts += _cuts(number, given, path, radius, overlap * radius, (feed or 0.0, down), fine or feed or 0.0, turn)
     cuts.append((path.middle, far, None, None, 0))
     mill(state, block, ((p * unit, h * unit, rate, None if c is None else c * unit, t) for p, h, rate, c, t in cuts))
-
-
-def note_inside(state: State, block: CurrentBlock) -> None:
-    """Warn, once, that the way inside a form is assumed."""
-    if INSIDE not in [remark.text for remark in state.warnings]:
-        state.warnings.append(Remark(INSIDE, block.line))
 
 
 def _form(block: CurrentBlock, number: int, given: Values, here: complex) -> Outline:

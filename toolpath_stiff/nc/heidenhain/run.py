@@ -12,10 +12,10 @@ from pathlib import PurePath
 
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.nc.codes.code import Code
+from toolpath_stiff.nc.contouring.contour import SIDES
+from toolpath_stiff.nc.contouring.drawing import drawing, elements_of
 from toolpath_stiff.nc.elements import Element
-from toolpath_stiff.nc.heidenhain.contour import SIDES
 from toolpath_stiff.nc.heidenhain.cycles import call, pattern
-from toolpath_stiff.nc.heidenhain.drawing import drawing, elements_of
 from toolpath_stiff.nc.heidenhain.expressions import CONDITIONS, PARAMETER, assigned, condition, work_out
 from toolpath_stiff.nc.heidenhain.free_contour import CORNERS, FREE, NOT_DETERMINED
 from toolpath_stiff.nc.heidenhain.functions import miscellaneous, retract

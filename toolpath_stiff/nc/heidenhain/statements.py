@@ -12,13 +12,13 @@ from functools import lru_cache
 
 from toolpath_stiff.nc.heidenhain.milling import AUTO, MAX
 from toolpath_stiff.nc.heidenhain.vocabulary import look_up
+from toolpath_stiff.nc.lines import code_text
 from toolpath_stiff.nc.place import Place
 from toolpath_stiff.nc.words import LONGEST_BLOCK, MOST_DIGITS, Word
 
 NUMBER = r"(?:\d+[.,]?\d*|[.,]\d+)"
 VALUE = rf"(?:[+-]\s*)?(?:{NUMBER}|Q[LR]?\d+)"
 _BEGIN = re.compile(r"\s*(/?)\s*(?:N?\d+(?![\d.,])\s*)?(/?)\s*", re.IGNORECASE)
-_COMMENT = re.compile(r'"[^"]*"|;.*')
 _HEAD = re.compile(
     r"(?:BEGIN|END)\s+PGM|BLK\s+FORM(?:\s+(?:0[.,][12]|[A-Z]+))?|TOOL\s+(?:CALL|DEF)|CYCL\s+DEF\s*\d+(?:\s*[.,]\d+)?"
     r"|CYCL\s+CALL(?:\s+P[OA][ST]\b)?|CALL\s+(?:LBL|PGM)|FN\s*\d+\s*:|FUNCTION\s+(?:RESET\s+|DWELL\s+)?[A-Z]+|PLANE\s+[A-Z]+"
@@ -64,12 +64,6 @@ class PlainStatement:
     begins: int
     optional: bool
     after: int
-
-
-def code_text(line: str) -> str:
-    """Line without its comment and continuation mark, in upper case; columns are kept."""
-    text = _COMMENT.sub(lambda part: part[0] if part[0].startswith('"') else "", line) if ";" in line else line
-    return text.rstrip().rstrip("~").rstrip().upper()
 
 
 def labels(lines: Sequence[str], first: int, stop: int) -> dict[str, list[int]]:

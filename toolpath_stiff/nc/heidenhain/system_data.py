@@ -8,7 +8,7 @@ import math
 import re
 from collections.abc import Callable
 
-from toolpath_stiff.nc.heidenhain.tools import FIRST_NAMED
+from toolpath_stiff.nc.codes.tools import FIRST_NAMED
 from toolpath_stiff.nc.state import State
 from toolpath_stiff.nc.tables import tool_of
 

@@ -5,14 +5,13 @@ HEIDENHAIN, user's manual of the iTNC 530, "Tool data", "Defining the blank form
 
 import math
 
-from toolpath_stiff.nc.codes.tools import change_tool
-from toolpath_stiff.nc.heidenhain.points import inch_tenths, outside_contour
+from toolpath_stiff.nc.codes.tools import change_tool, tool_number
+from toolpath_stiff.nc.contouring.points import inch_tenths, outside_contour
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.tables import ToolEntry, tool_of
 from toolpath_stiff.nc.words import AXES
 
 TOOL_PLANES = {"X!": "G19", "Y!": "G18", "Z!": "G17"}
-FIRST_NAMED = 10_001  # number given to the first tool called by name
 
 
 def tool_call(state: State, block: CurrentBlock, code: str) -> None:
@@ -43,20 +42,6 @@ def tool_call(state: State, block: CurrentBlock, code: str) -> None:
     block.refuse_if(plain.tilt and not math.isnan(length), None, "in a tilted plane", "PLANE RESET before it")
     frames.set_tool(0.0 if math.isnan(length) else length)
     plain.heading = None
-
-
-def tool_number(state: State, block: CurrentBlock) -> int | None:
-    """Number of the tool in a statement: as given, or by its name in the tool table (or in order of appearance)."""
-    name, value = block.values.get('"'), block.take("#")
-    if block.take('"') is None or name is None:
-        block.refuse_if(value is not None and (value != int(value) or value < 0), "#", "is no tool", "a whole number")
-        return None if value is None else int(value)
-    table = {entry.remark.upper(): number for number, entry in (state.tools or {}).items()}
-    names = state.plain.names
-    number = table.get(name.text) or names.setdefault(name.text, FIRST_NAMED + len(names))
-    if name.text not in table:
-        state.assume(f'the tool "{name.text}" has the number {number} here')
-    return number
 
 
 def tool_definition(state: State, block: CurrentBlock, code: str) -> None:

@@ -1,7 +1,7 @@
 """Table of statements of the plain language: head, function, meaning, source; and refused statements with reasons.
 
-The functions are in `contour`, `approach`, `coordinates`, `cycles`, `functions`; `run` carries out the flow (LBL, CALL,
-FN). M functions that mean what they mean in G code are the one table's (`codes.registry`).
+The functions are in `contouring`, `approach`, `circles`, `coordinates`, `cycles`, `functions`; `run` carries out the
+flow (LBL, CALL, FN). M functions that mean what they mean in G code are the one table's (`codes.registry`).
 """
 
 import re
@@ -9,10 +9,12 @@ from functools import lru_cache
 
 from toolpath_stiff.nc.codes.code import Code, Rows, holds_anyway, refused, table
 from toolpath_stiff.nc.codes.registry import code_meaning
-from toolpath_stiff.nc.heidenhain import approach, contour, coordinates, cycles, free_contour, functions, tools
-from toolpath_stiff.nc.heidenhain.contour import MANUAL, PATHS, POLAR
+from toolpath_stiff.nc.contouring import contour, tilting
+from toolpath_stiff.nc.heidenhain import approach, circles, coordinates, cycles, free_contour, functions, tools
 
 CONTROLS = ("heidenhain",)
+MANUAL = "HEIDENHAIN, user's manual of the iTNC 530"
+PATHS, POLAR = f"{MANUAL}, Path contours: Cartesian coordinates", f"{MANUAL}, Path contours: Polar coordinates"
 _CYCLES = "HEIDENHAIN, user's manual Cycles of the iTNC 530"
 _DRILLING, _TRANSFORM = f"{_CYCLES}, Fixed cycles: drilling", f"{_CYCLES}, Coordinate transformation cycles"
 _TAPPING, _PATTERNS = f"{_CYCLES}, Fixed cycles: tapping", f"{_CYCLES}, Pattern definitions"
@@ -33,8 +35,8 @@ _ROWS: Rows = (
     ("units", _BASICS, (("BEGIN PGM", functions.units, "begin, with the unit of length"),)),
     ("motion", PATHS, (
         ("L", contour.line, "straight"),
-        ("CC", contour.pole, "circle centre, pole"),
-        ("C", contour.circle, "arc about CC"),
+        ("CC", circles.pole, "circle centre, pole"),
+        ("C", circles.circle, "arc about CC"),
         ("CR", contour.radius_circle, "arc of a radius"),
         ("CT", contour.tangent_circle, "arc that goes on smoothly"),
         ("CHF", free_contour.rounding, "chamfer of the corner to the next element"),
@@ -42,15 +44,15 @@ _ROWS: Rows = (
     )),
     ("motion", POLAR, (
         ("LP", contour.polar_line, "straight, in polar coordinates"),
-        ("CP", contour.circle, "arc about CC by a polar angle, helix"),
+        ("CP", circles.circle, "arc about CC by a polar angle, helix"),
         ("CTP", contour.tangent_circle, "arc that goes on smoothly, in polar coordinates"),
     )),
     ("motion", _FREE, (
-        ("FPOL", contour.pole, "pole of a free contour"),
+        ("FPOL", circles.pole, "pole of a free contour"),
         ("FL|FC|FLT|FCT", free_contour.free_element, "straight, arc of a free contour; the latter two go on smoothly"),
     )),
     ("motion", f"{MANUAL}, Three-dimensional tool compensation", (
-        ("LN", functions.vectors, "straight, with a tool axis"),
+        ("LN", tilting.vectors, "straight, with a tool axis"),
     )),
     ("motion", _APPROACH, (
         ("APPR LT|APPR LN|APPR CT|APPR LCT|APPR PLT|APPR PLN|APPR PCT|APPR PLCT", approach.approach,

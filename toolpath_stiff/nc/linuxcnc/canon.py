@@ -304,7 +304,7 @@ class Follower(Record):
         sweep = geometry.arc_sweep(beginning, ending, center, turns < 0, int(abs(turns)) or 1)
         try:
             geometry.check_bulge(math.dist(beginning, center), sweep)
-        except geometry.ArcError as error:
+        except geometry.GeometryError as error:
             raise self.fail(error.found, error.expected, line=self.line) from None
         x, y, z = (c - r for c, r in zip(frames.to_control(middle), self.reference, strict=False))
         return Arc((x, y, z), frames.turn_direction(geometry.normal_of(self.plane)), sweep)

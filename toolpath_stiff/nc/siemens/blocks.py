@@ -3,8 +3,8 @@
 from collections.abc import Iterable
 
 from toolpath_stiff.nc.codes.code import code_name
+from toolpath_stiff.nc.contouring.drawing import drawing, elements_of
 from toolpath_stiff.nc.elements import Element
-from toolpath_stiff.nc.heidenhain.drawing import drawing, elements_of
 from toolpath_stiff.nc.interpreter import execute_straight
 from toolpath_stiff.nc.run_records import Tally
 from toolpath_stiff.nc.siemens.cycles import repeated

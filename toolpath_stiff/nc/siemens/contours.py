@@ -4,10 +4,8 @@ SIEMENS, SINUMERIK 840D, Programming Guide Cycles (11/2002), "Milling cycles", "
 """
 
 from toolpath_stiff.nc.codes.cutter import switch_off
-from toolpath_stiff.nc.compensation import RadiusCompensation
+from toolpath_stiff.nc.contouring.contour import go_beside, mill
 from toolpath_stiff.nc.elements import direction
-from toolpath_stiff.nc.geometry import PLANES
-from toolpath_stiff.nc.heidenhain.contour import COMPENSATED, mill
 from toolpath_stiff.nc.pockets import Cut, layers
 from toolpath_stiff.nc.siemens.milling import FINISH, approached, begin, digit
 from toolpath_stiff.nc.state import CurrentBlock, State
@@ -66,9 +64,7 @@ def mill_contour(state: State, block: CurrentBlock, code: str) -> None:
         ]
         mill(state, block, way_in)
         if side:
-            state.assume(COMPENSATED)
-            axes = PLANES[state.plane]
-            state.cutter = RadiusCompensation(side, apart, axes, state.length_scale, straight=True, rounded=True)
+            go_beside(state, side, apart)
         mill(state, block, [(contour[0][0], floor, feed, None, 0)])
         mill(state, block, [(end, floor, feed, center, turn) for _, end, center, turn in contour])
         switch_off(state, block, code)

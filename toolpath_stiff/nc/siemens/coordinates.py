@@ -9,10 +9,10 @@ from collections.abc import Mapping
 
 from toolpath_stiff.nc.codes import coordinates as settable
 from toolpath_stiff.nc.codes import tools
-from toolpath_stiff.nc.frames import rotation_matrix
+from toolpath_stiff.nc.contouring.points import outside_contour, present
+from toolpath_stiff.nc.contouring.tilting import put, turn_tool
+from toolpath_stiff.nc.frames import UNIT, product, rotation_matrix
 from toolpath_stiff.nc.geometry import PLANES
-from toolpath_stiff.nc.heidenhain.coordinates import UNIT, product, put, turn_tool
-from toolpath_stiff.nc.heidenhain.points import outside_contour, present
 from toolpath_stiff.nc.moves import Remark
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.tables import WORK_OFFSETS, WorkOffset

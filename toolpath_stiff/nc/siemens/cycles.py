@@ -8,12 +8,11 @@ import cmath
 import math
 from collections.abc import Iterator
 
+from toolpath_stiff.nc.contouring.contour import Stroke, check_known, go, plunge
+from toolpath_stiff.nc.contouring.points import in_plane, outside_contour, present
 from toolpath_stiff.nc.geometry import PLANES
-from toolpath_stiff.nc.heidenhain.contour import check_known, go
-from toolpath_stiff.nc.heidenhain.cycles import Stroke, Values, plunge
-from toolpath_stiff.nc.heidenhain.points import in_plane, outside_contour, present
-from toolpath_stiff.nc.state import CurrentBlock, State
-from toolpath_stiff.nc.strokes import MOST_STROKES, SAME_HEIGHT_MM
+from toolpath_stiff.nc.state import CurrentBlock, State, Values
+from toolpath_stiff.nc.strokes import MOST_STROKES, SAME_HEIGHT_MM, SHIFT
 from toolpath_stiff.nc.words import Word
 from toolpath_stiff.units import SECONDS_PER_DAY
 
@@ -57,7 +56,6 @@ COARSE = {3: 0.5, 4: 0.7, 5: 0.8, 6: 1.0, 8: 1.25, 10: 1.5, 12: 1.75, 14: 2.0, 1
 CHIP_BREAK_MM, AHEAD_MM, AHEAD_SHARE, MOST_AHEAD_MM = 1.0, 0.6, 1.0 / 50.0, 7.0  # of CYCLE83
 GRID = "the holes of CYCLE801 are drilled row by row, to and fro"
 SHORTER = "the pecks of CYCLE83 that are a share of the one before (DAM) end as those shortened by an amount"
-SHIFT = "the shift off the wall before the tool leaves the hole"
 
 
 def modal(state: State, block: CurrentBlock, code: str) -> None:

@@ -8,12 +8,11 @@ XOR, OR (those of bits are not read), the concatenation <<, and comparisons last
 import math
 import re
 from collections.abc import Callable, Container
-from dataclasses import dataclass
 from operator import ge, gt, le, lt
 from typing import ClassVar
 
-from toolpath_stiff.nc.heidenhain.expressions import COMMON, Formula, Value, simple_pattern, whole
 from toolpath_stiff.nc.parametric.expressions import ARITHMETIC
+from toolpath_stiff.nc.parametric.formulas import COMMON, Formula, Value, simple_pattern, whole
 
 STRING = re.compile(r'"[^"]*"')
 ELEMENT = re.compile(r"\[[\d,]+\]")
@@ -40,7 +39,6 @@ def array_of(name: str) -> str:
     return name.partition("[")[0] + "[]" if ELEMENT.search(name) else ""
 
 
-@dataclass
 class SiemensScanner(Formula):
     """Scanner of a block in Siemens' language."""
 

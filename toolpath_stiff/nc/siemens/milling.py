@@ -9,13 +9,11 @@ import math
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 
-from toolpath_stiff.nc.heidenhain.contour import mill, tool_radius
-from toolpath_stiff.nc.heidenhain.cycles import Values
-from toolpath_stiff.nc.heidenhain.points import in_plane, outside_contour, present
-from toolpath_stiff.nc.moves import Remark
+from toolpath_stiff.nc.contouring.contour import mill, tool_radius
+from toolpath_stiff.nc.contouring.points import in_plane, outside_contour, present
 from toolpath_stiff.nc.pockets import Cut, Outline, edge, layers, pocket
 from toolpath_stiff.nc.siemens.cycles import parameters
-from toolpath_stiff.nc.state import CurrentBlock, State
+from toolpath_stiff.nc.state import CurrentBlock, State, Values
 
 OUR_WAY = (
     "milling cycles: walls, floors and allowances are the program's; the way of the tool between them and the heights "
@@ -53,8 +51,7 @@ def begin(state: State, block: CurrentBlock, code: str) -> tuple[Values, float]:
     outside_contour(state, block, code, state.plain.side)
     radius = tool_radius(state, block, code) / state.plain.scale
     block.refuse_if(not radius, None, f"{code} with a tool of no radius", "D1 before it, and its diameter")
-    if all(remark.text != OUR_WAY for remark in state.warnings):
-        state.warnings.append(Remark(OUR_WAY, block.line))
+    state.warn_once(OUR_WAY, block.line)
     return values, radius
 
 

@@ -2,8 +2,8 @@
 
 SIEMENS, SINUMERIK 840D sl, Programming Manual Fundamentals, "Motion commands", "Tool radius compensation"; Job
 Planning, "Transformations". A coordinate is one of its block (X), of a step (IX, from =IC() or in G91), or absolute
-(@X, from =AC()). Contours are made as those of Heidenhain's controls: both enter a compensated contour perpendicular to
-it and round its outside corners.
+(@X, from =AC()). Contours are made by `contouring`, whose names the words get: as on Heidenhain's controls the tool
+enters a compensated contour perpendicular to it and rounds its outside corners.
 """
 
 import cmath
@@ -13,14 +13,14 @@ import numpy as np
 
 from toolpath_stiff.nc.codes.motion import record
 from toolpath_stiff.nc.codes.tools import HOLDS_HINT
-from toolpath_stiff.nc.geometry import PLANES
-from toolpath_stiff.nc.heidenhain import contour, functions
-from toolpath_stiff.nc.heidenhain.points import end_of, in_plane, named, outside_contour, plane_of_pole, polar, present
+from toolpath_stiff.nc.contouring import contour, tilting
+from toolpath_stiff.nc.contouring.points import end_of, in_plane, named, outside_contour, plane_of_pole, polar, present
+from toolpath_stiff.nc.geometry import PLANES, turned
 from toolpath_stiff.nc.moves import ARC, Arc
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES, Word
 
-POLAR = frozenset(("PR", "PA", "IPR", "IPA"))  # RP and AP are named as Heidenhain's PR and PA
+POLAR = frozenset(("PR", "PA", "IPR", "IPA"))  # RP and AP have the names PR and PA here
 SHORTER = ("DC", "ACP", "ACN")
 POINTS = POLAR | {"ANG"} | {f"{kind}{letter}" for letter in AXES for kind in ("", "I", "@", *SHORTER)}
 CENTERS = frozenset((*"IJK", "@I", "@J", "@K", "R", "AR", "TURN"))  # CR is R
@@ -89,7 +89,7 @@ def move(state: State, block: CurrentBlock) -> None:
 
 
 def _name_steps(state: State, block: CurrentBlock) -> None:
-    """Rename coordinates to Heidenhain's names: X, and IX for an increment."""
+    """Rename coordinates to the names of `contouring`: X, and IX for an increment."""
     plain, here = state.plain, present(state)
     for axis, letter in enumerate(AXES):
         if f"@{letter}" in block.free:
@@ -149,7 +149,7 @@ def _by_angle(state: State, block: CurrentBlock) -> None:
         other in plain.renumbered, "ANG", "right after another frame or tool length", f"{AXES[other]} before it"
     )
     way = step.value if step else block.values[AXES[known]].value - here[known] / state.length_scale
-    ahead = cmath.rect(1.0, math.radians(angle))
+    ahead = turned(angle)
     along, across = (ahead.real, ahead.imag) if known == plane[0] else (ahead.imag, ahead.real)
     backward = abs(along) < LEAST_ANGLE or way * along < 0.0
     block.refuse_if(backward, "ANG", "leads away from that end", "its direction")
@@ -167,7 +167,7 @@ def _lean(state: State, block: CurrentBlock) -> None:
     for letter, value in zip(("TX", "TY", "TZ"), turned, strict=True):
         mark(block, letter, "A3", value)
     state.assume(ENDS)
-    functions.vectors(state, block, "LN")
+    tilting.vectors(state, block, "LN")
 
 
 def arc(state: State, block: CurrentBlock, code: str) -> None:

@@ -3,9 +3,10 @@
 SIEMENS, SINUMERIK 840D sl, Programming Manual Fundamentals, "Structure and contents of an NC program".
 """
 
+import math
 import re
 
-from toolpath_stiff.nc.heidenhain.statements import code_text
+from toolpath_stiff.nc.lines import code_text
 
 HEAD = re.compile(r"\s*(/\d?)?\s*(?:N(\d+)|(:\d+))?\s*(/\d?)?\s*(?:([A-Z_]{2}\w*)\s*:(?![=\d])\s*)?", re.ASCII)
 PROGRAM = re.compile(r"\s*%_N_(\w+?)_(?:MPF|SPF)\b|\s*(?:N\d+\s+)?PROC\s+(\w+)\s*(.*)", re.ASCII)
@@ -37,6 +38,24 @@ def labels_of(heads: list[re.Match[str]]) -> dict[str, list[int]]:
         for label in (head[5], head[2] and f"N{head[2]}", head[3]):
             labels.setdefault(label or "", []).append(row)
     return labels
+
+
+def line_of(rows: list[int], ends: set[int], row: int, way: str) -> int | None:
+    """Of a label's lines the one that a jump from a line of the same program goes to; None: there is none.
+
+    `ends`: of programs. GOTOF: forward, GOTOB: backward, REPEAT: backward first, others (GOTO): forward first.
+    """
+    first = max((end for end in ends if end <= row), default=0)
+    stop = min((end for end in ends if end > first), default=math.inf)
+    ahead = [place for place in rows if row < place < stop]
+    behind = [place for place in reversed(rows) if first <= place <= row]
+    places = {"GOTOF": ahead, "GOTOB": behind, "REPEAT": behind + ahead}.get(way, ahead + behind)
+    return places[0] if places else None
+
+
+def is_head(head: re.Match[str]) -> bool:
+    """True if a line only names the program that begins there."""
+    return PROGRAM.match(head.string) is not None or head.string.lstrip()[:1] == "%"
 
 
 def programs_of(heads: list[re.Match[str]]) -> dict[str, int]:

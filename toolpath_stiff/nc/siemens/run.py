@@ -9,10 +9,10 @@ import re
 from collections.abc import Iterator
 from itertools import zip_longest
 
-from toolpath_stiff.nc.heidenhain.expressions import Value
-from toolpath_stiff.nc.heidenhain.statements import code_text
+from toolpath_stiff.nc.lines import code_text
 from toolpath_stiff.nc.moves import Remark
-from toolpath_stiff.nc.parametric.run import Step
+from toolpath_stiff.nc.parametric.formulas import Value
+from toolpath_stiff.nc.parametric.run import ParametricRun, Step
 from toolpath_stiff.nc.parametric.statements import Statement, Steering
 from toolpath_stiff.nc.parametric.variables import Values
 from toolpath_stiff.nc.plain_lines import PlainRun
@@ -23,11 +23,10 @@ from toolpath_stiff.nc.siemens.blocks import carry_out, draw, sort_words, straig
 from toolpath_stiff.nc.siemens.contours import contour_ends
 from toolpath_stiff.nc.siemens.coordinates import bring_back, modes_of
 from toolpath_stiff.nc.siemens.expressions import NAME, SET_HERE, SiemensScanner, array_of
-from toolpath_stiff.nc.siemens.labels import LabelRun
-from toolpath_stiff.nc.siemens.programs import PROGRAM, heads_of, labels_of, plain_texts, programs_of
+from toolpath_stiff.nc.siemens.programs import PROGRAM, heads_of, is_head, labels_of, line_of, plain_texts, programs_of
 from toolpath_stiff.nc.siemens.tools import set_data
 from toolpath_stiff.nc.siemens.vocabulary import meaning_of
-from toolpath_stiff.nc.siemens.words import read_words, steering_of
+from toolpath_stiff.nc.siemens.words import chosen, range_of, read_words, section_of, steering_of
 from toolpath_stiff.nc.state import LATHE_HINT, CurrentBlock, Flow, Then
 from toolpath_stiff.nc.words import AXES, Block, Word
 
@@ -44,7 +43,7 @@ SEARCHED = ("$P_SEARCH", "$P_SEARCHL", "$P_ISTEST", "$P_SIM", "$P_DRYRUN")
 RUNS = "the program runs from its beginning, not searched, tested or simulated ($P_SEARCH, $P_ISTEST, $P_SIM)"
 
 
-class SiemensRun(LabelRun):
+class SiemensRun(ParametricRun):
     """A run of a program in Siemens' language; parameters as of `ProgramRun`.
 
     Subprograms are sections of the file (`%_N_NAME_SPF`), or files NAME.SPF in the folder of the controller.
@@ -93,22 +92,20 @@ class SiemensRun(LabelRun):
         columns, place = range(1, len(text) + 2), self._place(row)
         return SiemensScanner(text, columns, place, "Siemens' language", False, begin, lookup=self._variable)
 
+    def _code(self, row: int) -> SiemensScanner:
+        """Scanner of a block behind its number and label."""
+        return self._scanner(row, self._begins[row].end())
+
     def _statement(self, row: int) -> Statement:
         if row not in self._statements:
             begin = self._begins[row]
             slash = begin[1] or begin[4] or ""
             block = Block(row + 1, (), optional=bool(slash), switch=int(slash[1:] or 1) or 1)
             steering = None
-            if not self._is_head(row):
-                scanner = self._scanner(row, begin.end())
-                steering = steering_of(scanner, lambda place: lambda _: self._scanner(row, place).real())
+            if not is_head(self._begins[row]):
+                steering = steering_of(self._code(row), lambda place: lambda _: self._scanner(row, place).real())
             self._statements[row] = Statement(block, steering=steering)
         return self._statements[row]
-
-    def _is_head(self, row: int) -> bool:
-        """True if a line only names the program that begins there."""
-        code = self._begins[row].string
-        return PROGRAM.match(code) is not None or code.lstrip()[:1] == "%"
 
     def _read(self, row: int) -> Block:
         statement, code = self._statement(row), self._begins[row].string
@@ -116,9 +113,9 @@ class SiemensRun(LabelRun):
         if row in self._called:
             return self._called[row]
         line = row + 1 if row < self._main_lines else self._line_of_call()
-        if self._is_head(row):
+        if is_head(self._begins[row]):
             return Block(line, ())
-        words = read_words(self._scanner(row, self._begins[row].end()), self._define)
+        words = read_words(self._code(row), self._define)
         block = Block(line, tuple(words), statement.block.optional, switch=statement.block.switch)
         if row < self._main_lines and self._lexer.lines[row] != "?":
             self._called[row] = block
@@ -254,35 +251,58 @@ class SiemensRun(LabelRun):
         """Scanner of an expression in text that is not part of the line."""
         return SiemensScanner(text, [1] * (len(text) + 1), self._place(row), "", lookup=self._variable)
 
+    def _to_label(self, row: int, way: str, label: str) -> int:
+        """The line of a label; sections that are repeated and do not hold it end."""
+        to = line_of(self._labels.get(label, []), self._ends, row, way)
+        if to is None:
+            raise self._fail(row, f"{way} {label}: the program has no such label there", "LABEL: before a block")
+        while self._levels and self._levels[-1].stop >= 0 and not self._levels[-1].first <= to < self._levels[-1].stop:
+            self._levels.pop()
+        return to
+
+    def _jump_to(self, row: int, steering: Steering) -> int | None:
+        way, label = steering.label.split()
+        stays = (steering.values and not self._value(steering)) or (way == "GOTOC" and label not in self._labels)
+        return None if stays else self._to_label(row, way, label)
+
+    def _case(self, row: int, steering: Steering) -> int | None:
+        way = chosen(self._code(row))
+        return self._to_label(row, *way) if way else None
+
+    def _section(self, row: int, steering: Steering) -> int | None:
+        """REPEAT, REPEATB: run the blocks from a label on again."""
+        kind, label, last, times = section_of(self._code(row))
+        if not times:
+            return None
+        first = self._to_label(row, "REPEAT", label)
+        if last or kind == "REPEATB":
+            stop = (self._to_label(first, "GOTO", last) if last else first) + 1
+        elif first < row:
+            stop = next((end for end in self._labels.get("ENDLABEL", []) if first < end < row), row)
+        else:
+            stop = self._to_label(first, "GOTOF", "ENDLABEL")
+        self._begin(Subprogram(label, first, row + 1, times - 1, stop=stop), row, steering.column)
+        return first
+
     def _for(self, row: int, steering: Steering) -> int | None:
-        name, first, last = self._range(row)
+        name, first, last = range_of(self._code(row))
         self._define(name, first, steering.column, "")
         return None if first <= last else self._structure.end[row] + 1
 
     def _end_for(self, row: int, steering: Steering) -> int | None:
         start = self._structure.start[row]
-        name, _, last = self._range(start)
+        name, _, last = range_of(self._code(start))
         value = self._variable(name, steering.column)
         assert not isinstance(value, str)
         again = value + 1.0 <= last
         self._define(name, value + 1.0 if again else math.nan, steering.column, "")  # what it then holds is not said
         return start + 1 if again else None
 
-    def _range(self, row: int) -> tuple[str, float, float]:
-        """The variable, first value and last value of a FOR."""
-        scanner = self._scanner(row, self._begins[row].end())
-        scanner.part(NAME)
-        name = scanner.part(NAME) + scanner.index()
-        scanner.refuse_if(not scanner.sign("="), "FOR without its first value", "FOR I=1 TO 5")
-        first = scanner.real()
-        scanner.refuse_if(scanner.part(NAME) != "TO", "FOR without TO", "FOR I=1 TO 5")
-        return name, first, scanner.real()
-
     def _until(self, row: int, steering: Steering) -> int | None:
         return None if self._value(steering) else self._structure.start[row] + 1
 
     def _call_sub(self, row: int, steering: Steering) -> int | None:
-        name, scanner = steering.label, self._scanner(row, self._begins[row].end())
+        name, scanner = steering.label, self._code(row)
         if scanner.part(NAME) in BY_TEXT:
             name = PATH.sub("", str(scanner.result()).upper())
         first = self._sub(name, row, steering.column) + 1

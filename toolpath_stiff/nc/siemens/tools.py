@@ -7,9 +7,8 @@ SIEMENS, SINUMERIK 840D sl, Programming Manual Fundamentals, "Tool change", "Too
 import math
 import re
 
-from toolpath_stiff.nc.codes.tools import change_tool
-from toolpath_stiff.nc.heidenhain.points import outside_contour
-from toolpath_stiff.nc.heidenhain.tools import tool_number
+from toolpath_stiff.nc.codes.tools import change_tool, tool_number
+from toolpath_stiff.nc.contouring.points import outside_contour
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.tables import ToolEntry, tool_of
 

@@ -7,8 +7,8 @@ absolute and incremental dimensions"; Job Planning, "Definition of user variable
 import re
 from collections.abc import Callable
 
-from toolpath_stiff.nc.heidenhain.expressions import Value
 from toolpath_stiff.nc.parametric.expressions import Value as Number
+from toolpath_stiff.nc.parametric.formulas import Value
 from toolpath_stiff.nc.parametric.statements import Steering
 from toolpath_stiff.nc.siemens.cycles import SIGNATURES, TEXTS
 from toolpath_stiff.nc.siemens.expressions import NAME, SiemensScanner
@@ -23,7 +23,7 @@ DIMENSION = re.compile(r"(IC|ACP|ACN|AC|DC)(?=\s*\()")
 PREFIX = {"IC": "I", "AC": "@", "DC": "DC", "ACP": "ACP", "ACN": "ACN", "": ""}
 JUMP = re.compile(r"(GOTO[FBC]?)\s+([A-Z_]\w*|:?\d+)\s*$", re.ASCII)
 DEFAULT, CASE_JUMP = re.compile(r"DEFAULT\b"), re.compile(r"\s*(GOTO[FB]?)\s+([A-Z_]\w*|:?\d+)\s*", re.ASCII)
-SECTION = re.compile(r"REPEATB?\s+(?!P\s*=)[A-Z_:]\w*", re.ASCII)
+SECTION = re.compile(r"(REPEATB?)\s+(?!P\s*=)([A-Z_:]\w*)(?:\s+(?!P\s*=)(\w+))?", re.ASCII)
 TYPES: dict[str, Value] = {"REAL": 0.0, "INT": 0.0, "BOOL": False, "CHAR": "", "STRING": ""}
 ADDRESSES = {
     *AXES, *VECTOR, *CORNERS, *WORDS, *"IJKFSTDMGH", "RP", "AP", "CR", "AR", "TURN", "I1", "J1", "K1", "RPL", "FP",
@@ -73,6 +73,26 @@ def chosen(scanner: SiemensScanner) -> tuple[str, str] | None:
             way = (jump[1], jump[2]) if case == "DEFAULT" else way
     scanner.refuse_if(wrong, "CASE of another form", "CASE R1 OF 1 GOTOF ONE 2 GOTOF TWO DEFAULT GOTOF REST")
     return way
+
+
+def range_of(scanner: SiemensScanner) -> tuple[str, float, float]:
+    """The variable, first value and last value of a FOR."""
+    scanner.part(NAME)
+    name = scanner.part(NAME) + scanner.index()
+    scanner.refuse_if(not scanner.sign("="), "FOR without its first value", "FOR I=1 TO 5")
+    first = scanner.real()
+    scanner.refuse_if(scanner.part(NAME) != "TO", "FOR without TO", "FOR I=1 TO 5")
+    return name, first, scanner.real()
+
+
+def section_of(scanner: SiemensScanner) -> tuple[str, str, str, int]:
+    """REPEAT or REPEATB, the first and the last label of its section ("": not given), and how often it runs."""
+    section = SECTION.match(scanner.text, scanner.position)
+    assert section is not None
+    scanner.position = section.end()
+    times = scanner.times()
+    scanner.refuse_if(not scanner.done, f"{scanner.rest()} behind {section[1]}", "REPEAT LABEL P=2")
+    return section[1], section[2], section[3] or "", times
 
 
 def read_words(scanner: SiemensScanner, define: Define) -> list[Word]:

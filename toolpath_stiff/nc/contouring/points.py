@@ -1,6 +1,7 @@
-"""Points and feeds that the words of a plain statement name: axis words and their steps, polar words, F. mm, degrees.
+"""Points and feeds that the words of a statement name: axis words and their steps, polar words, F. mm, degrees.
 
-HEIDENHAIN, user's manual of the iTNC 530, "Fundamentals of positioning", "Polar coordinates", "Feed rate F".
+HEIDENHAIN, user's manual of the iTNC 530, "Fundamentals of positioning", "Polar coordinates", "Feed rate F"; SIEMENS,
+SINUMERIK 840D sl, Programming Manual Fundamentals, "Travel commands with polar coordinates".
 """
 
 import cmath
@@ -9,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from toolpath_stiff.nc.codes.feeds import SLOWEST
-from toolpath_stiff.nc.geometry import PLANES
+from toolpath_stiff.nc.geometry import PLANES, turned
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.words import AXES
 from toolpath_stiff.units import MM_PER_INCH
@@ -95,7 +96,7 @@ def polar(state: State, block: CurrentBlock, pole: complex) -> dict[int, float]:
     lost = abs(here) < ON_CIRCLE_MM and angle is None
     block.refuse_if(lost, None, "takes the polar angle of the pole itself", "PA")
     heading = (math.degrees(cmath.phase(here)) if angle is None else angle) + (turn or 0.0)
-    place = pole + cmath.rect(size, math.radians(heading))
+    place = pole + turned(heading, size)
     first, second, _ = PLANES[state.plane]
     return named(state, block) | {first: place.real, second: place.imag}
 

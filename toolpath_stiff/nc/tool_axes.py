@@ -11,21 +11,20 @@ linear interpolation departs by at most an eighth of the largest of them. Along 
 import math
 from collections.abc import Sequence
 
-from toolpath_stiff.nc.cutter_location.circles import cross, dot
-from toolpath_stiff.nc.geometry import ArcError, Vector, roll_pitch_of_axis
+from toolpath_stiff.nc.geometry import GeometryError, Vector, cross, dot, roll_pitch_of_axis
 
-AXIS_TOLERANCE = 1e-3  # of the length of a unit vector: four decimals and a little more
+OFF_UNIT = 1e-3  # of the length of a unit vector: four decimals and a little more
 GREAT_CIRCLE_DEG = 0.01  # how far the tool axis may leave the great circle within a move
 STEEPEST = 89.0  # deg of roll up to which that holds; at 90 pitch is not defined
 TURNED_OVER = 179.0  # deg: beyond, two axes do not say in which plane the tool turns
 
 
 def unit_axis(numbers: Sequence[float], what: str = "a tool axis") -> Vector:
-    """Axis of length 1. Raises `ArcError` if the given one is further off than `AXIS_TOLERANCE`."""
+    """Axis of length 1. Raises `GeometryError` if the given one is further off than `OFF_UNIT`."""
     i, j, k = numbers
     length = math.sqrt(i * i + j * j + k * k)
-    if abs(length - 1.0) > AXIS_TOLERANCE:
-        raise ArcError(f"{what} {i:g},{j:g},{k:g} of length {length:.6g}", f"a unit vector, within {AXIS_TOLERANCE:g}")
+    if abs(length - 1.0) > OFF_UNIT:
+        raise GeometryError(f"{what} {i:g},{j:g},{k:g} of length {length:.6g}", f"a unit vector, within {OFF_UNIT:g}")
     return (i / length, j / length, k / length)
 
 
@@ -48,13 +47,13 @@ def angle_of(first: Vector, second: Vector) -> float:
 
 
 def division(first: Vector, second: Vector) -> int:
-    """Number of equal parts for a turn of the tool axis. Raises `ArcError` if it turns over."""
+    """Number of equal parts for a turn of the tool axis. Raises `GeometryError` if it turns over."""
     chord = math.dist(first, second)
     if chord < 0.008 and abs(first[1]) < 0.9 and abs(second[1]) < 0.9:
         return 1  # most moves: half a degree or less, with the tool well away from Y
     angle = angle_of(first, second)
     if angle > TURNED_OVER:
-        raise ArcError(f"a tool axis that turns over by {angle:.1f} degrees within one move", "points in between")
+        raise GeometryError(f"a tool axis that turns over by {angle:.1f} degrees within one move", "points in between")
     turn = math.radians(angle)
     steepest = math.radians(min(_steepest_roll(first, second, turn), STEEPEST))
     normal_y = abs(first[2] * second[0] - first[0] * second[2]) / math.sin(turn)

@@ -1,7 +1,9 @@
-"""Contour statements: L, LP, LN, CC, C, CP, CR, CT, CTP, and the corners CHF and RND. mm and degrees, in program axes.
+"""Contours by the words of statements: lines, arcs, corners between them, compensation; moves of cycles. mm, degrees.
 
 HEIDENHAIN, user's manuals of the TNC 426, the iTNC 530 and the TNC 640, "Programming contours" ("Path contours:
-Cartesian coordinates", "Polar coordinates"), "Tool compensation". Moves are recorded as those of G0 to G3.
+Cartesian coordinates", "Polar coordinates"), "Tool compensation"; SIEMENS, SINUMERIK 840D sl, Programming Manual
+Fundamentals, "Motion commands", "Tool radius compensation". Words have Heidenhain's names (RL, PA, FMAX), which
+Siemens' words get before. Coordinates are those of program axes; moves are recorded as those of G0 to G3.
 """
 
 import cmath
@@ -11,50 +13,36 @@ from collections.abc import Iterable
 from toolpath_stiff.nc import geometry
 from toolpath_stiff.nc.codes.center_path import arc_about
 from toolpath_stiff.nc.codes.cutter import LEFT, RIGHT, switch_off
-from toolpath_stiff.nc.codes.motion import machine_move, record
+from toolpath_stiff.nc.codes.motion import machine_move, record, record_strokes
 from toolpath_stiff.nc.codes.tools import HOLDS_HINT
 from toolpath_stiff.nc.compensation import RadiusCompensation
-from toolpath_stiff.nc.elements import STRAIGHT_ON, Element, cut_off
-from toolpath_stiff.nc.elements import direction as direction_of
-from toolpath_stiff.nc.geometry import PLANES
-from toolpath_stiff.nc.heidenhain.points import (
-    FREE_POLE,
+from toolpath_stiff.nc.contouring.points import (
     ON_CIRCLE_MM,
     end_of,
     feed,
     in_plane,
-    inch_tenths,
     named,
     outside_contour,
     plane_of_pole,
     polar,
     present,
 )
-from toolpath_stiff.nc.moves import ARC, FEED, RAPID, Remark
+from toolpath_stiff.nc.elements import STRAIGHT_ON, Element, cut_off, direction
+from toolpath_stiff.nc.geometry import PLANES
+from toolpath_stiff.nc.moves import ARC, CYCLE, FEED, RAPID, Remark
 from toolpath_stiff.nc.pockets import Cut
 from toolpath_stiff.nc.state import CurrentBlock, State
+from toolpath_stiff.nc.strokes import SAME_HEIGHT_MM
 from toolpath_stiff.nc.tables import LARGEST_MM
 from toolpath_stiff.nc.words import AXES, Word
 
-MANUAL = "HEIDENHAIN, user's manual of the iTNC 530"
-PATHS, POLAR = f"{MANUAL}, Path contours: Cartesian coordinates", f"{MANUAL}, Path contours: Polar coordinates"
 COMPENSATED = (
     "RL, RR (G41, G42) begin and end perpendicular to the first and the last contour element and round outside corners"
 )
 Circle = tuple[complex, int, int]  # about a centre, +1 counter-clockwise or -1, turns begun
+Stroke = tuple[float, float | None, float]  # height, feed, dwell after it
 SIDES = {"RL": LEFT, "RR": RIGHT}
 UNKNOWN_POINT = "goes to a point of the machine that the program does not give: left out of the path"
-
-
-def pole(state: State, block: CurrentBlock, code: str) -> None:
-    """CC, FPOL: circle centre, pole, perhaps in another plane than the tool's; without coordinates the present one."""
-    point = named(state, block)
-    plane = next((name for name, axes in PLANES.items() if point.keys() == {*axes[:2]}), None) if point else state.plane
-    if plane is None:
-        raise block.fail(code, "with other coordinates than two of a plane", "two of X, Y, Z, or none")
-    first, second, _ = PLANES[plane]
-    point = point or dict(enumerate(present(state)))
-    state.plain.pole = FREE_POLE if code == FREE_POLE else plane, complex(point[first], point[second])
 
 
 def take_side(block: CurrentBlock) -> str | None:
@@ -95,14 +83,16 @@ def tool_radius(state: State, block: CurrentBlock, side: str | None) -> float:
 
 
 def begin_compensation(state: State, block: CurrentBlock, side: str) -> None:
-    """The tool beside the contour from the next move on."""
+    """The tool beside the contour, by its radius, from the next move on."""
     radius = tool_radius(state, block, side)
+    go_beside(state, SIDES[side] if radius >= 0.0 else -SIDES[side], abs(radius) / state.plain.scale)
+
+
+def go_beside(state: State, side: int, apart: float) -> None:
+    """The tool's centre at a distance from the contour, +1 left of it or -1, from the next move on."""
     state.assume(COMPENSATED)
-    scale = state.plain.scale
-    turned = SIDES[side] if radius >= 0.0 else -SIDES[side]
-    state.cutter = RadiusCompensation(
-        turned, abs(radius) / scale, PLANES[state.plane], state.length_scale, straight=True, rounded=True
-    )
+    axes = PLANES[state.plane]
+    state.cutter = RadiusCompensation(side, apart, axes, state.length_scale, straight=True, rounded=True)
 
 
 def go(
@@ -160,6 +150,13 @@ def mill(state: State, block: CurrentBlock, cuts: Iterable[Cut]) -> None:
         there = {first: place.real, second: place.imag, normal: height}
         state.feed = rate or modal
         go(state, block, there, None if center is None else (center, turn, 1), rate is None)
+    state.feed, state.plain.heading = modal, None
+
+
+def plunge(state: State, block: CurrentBlock, path: Iterable[Stroke]) -> None:
+    """Carry out strokes at the present point, in mm and mm/min; a feed of 0 means that none was given."""
+    modal, moves = state.feed, ((height, RAPID if rate is None else CYCLE, rate, wait) for height, rate, wait in path)
+    record_strokes(state, block, PLANES[state.plane][2], moves, SAME_HEIGHT_MM)
     state.feed, state.plain.heading = modal, None
 
 
@@ -240,20 +237,6 @@ def polar_line(state: State, block: CurrentBlock, code: str) -> None:
         go(state, block, there, rapid=rapid)
 
 
-def circle(state: State, block: CurrentBlock, code: str) -> None:
-    """C: about CC to a point; CP: about CC by or to a polar angle, with a height a helix."""
-    step, turns = block.values.get("IPA"), 1
-    block.refuse_if(code == "CP" and not block.has("PA") and step is None, code, "without an angle", "PA or IPA")
-    block.refuse_if(block.has("PR") or block.has("IPR"), code, "with a radius", "the radius of its start")
-    turn = direction(block, step.value if step else 0.0)
-    if step is not None:
-        block.refuse_if(step.value * turn <= 0.0, step, "is against the direction of rotation DR", "the same sign")
-        turns = max(1, math.ceil(abs(step.value) / 360.0 - 1e-9))
-    with plane_of_pole(state, block) as center:
-        there = polar(state, block, center) if code == "CP" else named(state, block)
-        arc_to(state, block, there, (center, turn, turns))
-
-
 def arc_to(state: State, block: CurrentBlock, there: dict[int, float], about: Circle) -> None:
     """An arc to a point, with its feed; the side of the compensation may not change on it."""
     rapid = feed(state, block)
@@ -264,7 +247,7 @@ def arc_to(state: State, block: CurrentBlock, there: dict[int, float], about: Ci
     go(state, block, there, about)
 
 
-def direction(block: CurrentBlock, step: float = 0.0) -> int:
+def turn_of(block: CurrentBlock, step: float = 0.0) -> int:
     """+1 or -1 by DR+ and DR-; without them by the sign of an angle's step."""
     plus, minus = block.take("DR+"), block.take("DR-")
     block.refuse_if(plus is None and minus is None and not step, None, "without its direction", "DR+ or DR-")
@@ -273,7 +256,7 @@ def direction(block: CurrentBlock, step: float = 0.0) -> int:
 
 def radius_circle(state: State, block: CurrentBlock, code: str) -> None:
     """CR: to a point by a radius; a negative one goes the longer way."""
-    turn, there, radius = direction(block), named(state, block), block.take("R")
+    turn, there, radius = turn_of(block), named(state, block), block.take("R")
     if not radius:
         raise block.fail(None, "without its radius", "R")
     start, end = in_plane(state, present(state)), end_of(state, there)
@@ -304,18 +287,6 @@ def tangent_circle(state: State, block: CurrentBlock, code: str) -> None:
     arc_to(state, block, there, (start + radius * 1j * ahead, 1 if radius > 0.0 else -1, 1))
 
 
-def corner(state: State, block: CurrentBlock, code: str) -> None:
-    """CHF, RND: cut off or round the corner between the contour elements before and after."""
-    block.refuse_if(state.plain.held is None, None, "without a contour element before it", "L, C, CR or CT before it")
-    size = block.take("#") if code == "CHF" and block.has("#") else block.take("R")
-    rate = block.take("F")
-    if rate is not None:  # holds only for the corner
-        block.values["F alone"] = Word("F", rate * inch_tenths(state), 1, "F")
-    block.refuse_if(not size or size < 0.0, None, "without its size", "RND R5, CHF 2")
-    block.values["size"] = Word("R", (size or 0.0) * state.length_scale, 1, "R")
-    state.plain.corner = block
-
-
 def _cut_corner(state: State, after: CurrentBlock, element: Element, there: dict[int, float], rapid: bool) -> None:
     """Carry out the waiting element, shortened, and its corner; the tool then stands where the next element begins."""
     (block, held, rate), corner_block, modal = state.plain.held or (None, None, None), state.plain.corner, state.feed
@@ -326,7 +297,7 @@ def _cut_corner(state: State, after: CurrentBlock, element: Element, there: dict
     size, rounded = corner_block.values["size"].value, corner_block.block.words[0].text == "RND"
     after.refuse_if(rapid or there.keys() - {first, second}, None, *_NO_CORNER)
     if "across" in corner_block.values:  # the chamfer's own length, not that along the lines
-        turned = cmath.phase(direction_of(element, held[1]) / direction_of(held, held[1]))
+        turned = cmath.phase(direction(element, held[1]) / direction(held, held[1]))
         size /= 2.0 * max(math.cos(turned / 2.0), STRAIGHT_ON)
     lines = held[2] is None and element[2] is None
     corner_block.refuse_if(not rounded and not lines, None, "beside an arc", "CHF between two lines")

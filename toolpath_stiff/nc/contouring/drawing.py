@@ -8,10 +8,10 @@ import math
 from contextlib import suppress
 
 from toolpath_stiff.nc.compensation import RadiusCompensation
+from toolpath_stiff.nc.contouring.contour import mill
 from toolpath_stiff.nc.elements import Contour, cut_off, swept
 from toolpath_stiff.nc.frames import Frames
-from toolpath_stiff.nc.geometry import PLANES, ArcError
-from toolpath_stiff.nc.heidenhain.contour import mill
+from toolpath_stiff.nc.geometry import PLANES, GeometryError
 from toolpath_stiff.nc.pockets import LEAST_MM
 from toolpath_stiff.nc.state import CurrentBlock, State
 from toolpath_stiff.nc.tables import Offsets
@@ -65,7 +65,7 @@ def path_beside(state: State, block: CurrentBlock, contour: Contour, left: float
     """Path of the tool's centre at a distance to the left of a contour: cutter compensation as in RL, RR.
 
     Of a closed contour from the middle of its first element and to it. `rounding`: radius of the path itself in inside
-    corners, where there is room. Raises `ArcError` where the tool does not fit.
+    corners, where there is room. Raises `GeometryError` where the tool does not fit.
     """
     if is_closed(contour):
         (start, end, center, turn), last = contour[0], contour[-1][1]
@@ -81,7 +81,7 @@ def path_beside(state: State, block: CurrentBlock, contour: Contour, left: float
     drawn.trace, path = drawn.recorder.recent, Contour()
     for element in elements_of(drawn, block, "a cycle"):
         path.append(element)
-        with suppress(ArcError):
+        with suppress(GeometryError):
             if rounding and len(path) > 1 and (cut := cut_off(path[-2], element, rounding, rounded=True)):
                 path[-2:] = [(path[-2][0], cut[0], *path[-2][2:]), cut, (cut[1], *element[1:])]
     return path

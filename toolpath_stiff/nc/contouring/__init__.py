@@ -1,0 +1,1 @@
+"""What contouring controls with words of their own share: points and poles, contours, tilted planes."""
