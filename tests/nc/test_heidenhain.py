@@ -436,6 +436,21 @@ def test_check_says_the_language_why_and_what_it_needs(capsys, tmp_path):
     assert "as asked for: --dialect heidenhain" in capsys.readouterr().out
 
 
+def test_check_of_a_polar_point_that_is_not_known(capsys, tmp_path):
+    """Of the machine (M91), by a parameter that the machine alone knows (FN 18)."""
+    file = tmp_path / "part.h"
+    lines = (
+        "BEGIN PGM P MM",
+        "TOOL CALL 1 Z S1",
+        "FN 18: SYSREAD Q9 = ID990 NR1 IDX0",
+        "CC X+0 Y+0",
+        "LP PR+Q9 PA+0 FMAX M91",
+    )
+    file.write_text("\n".join([*lines, "END PGM P MM"]))
+    assert main(["check", str(file)]) == 1
+    assert "leads to a point that is not known" in capsys.readouterr().out
+
+
 WRITTEN = """0 BEGIN PGM P MM
 1 TOOL CALL 1 Z S1000 F200
 2 L X+10 Y+0 R0 FMAX M3 ; start

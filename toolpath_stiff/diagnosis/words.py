@@ -159,9 +159,7 @@ def _alike(entry: Sequence[str]) -> str:
     if not instead:
         return words
     parts = ", ".join(part for more in instead for part in more)
-    return (
-        f"{words}; the strut law had to move for it, or with the file's law one of these is there too: {parts}"
-    )
+    return f"{words}; the strut law had to move for it, or with the file's law one of these is there too: {parts}"
 
 
 def _most_left(diagnosis: Diagnosis) -> str:
