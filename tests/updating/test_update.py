@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,13 +13,16 @@ from tests.conftest import as_written
 from tests.stiffness.cases import nist
 from tests.updating.cases import active, campaign, table_1
 from toolpath_stiff.correction.additions import parse_addition
+from toolpath_stiff.correction.objections import risen_conditions
 from toolpath_stiff.correction.task import MACHINE, UpdateTask
 from toolpath_stiff.correction.update import build_ladder
 from toolpath_stiff.errors import InputError
+from toolpath_stiff.inference.left_out import HeldOut
 from toolpath_stiff.inference.prediction import Predictor
 from toolpath_stiff.machine.file import parse_machine
 from toolpath_stiff.machine.model import EffectEntry
 from toolpath_stiff.machine.writer import machine_toml
+from toolpath_stiff.readings.measurements import read_measurements
 from toolpath_stiff.report.update import residuals_csv
 
 MEAN_OVER_SD = np.sqrt(2.0 / np.pi)
@@ -134,6 +138,28 @@ def test_what_leaves_a_pattern_that_no_noise_makes_is_not_written_unless_named()
     named = updated(patterned, "weak_strut", believe=MACHINE)  # of several missing effects the first
     assert named.accepted and any(clause in sentence for sentence in named.assumptions)
     assert not updated(data, "weak_strut").objections
+
+
+def test_auto_judges_an_effect_beside_those_found_after_it():
+    """Readings of a simulator that shares nothing with this tree: the indicator's stand gives way, and strut 4 is soft.
+
+    Beside the strut a stand predicts as well as the table, which was found before the strut and outvoted it then.
+    """
+    data = read_measurements(Path(__file__).parent / "stand_and_weak_strut.csv", nist())
+    found = updated(data, auto=True)
+    assert {*found.added} == {"table_compliance", "weak_strut"} and not found.accepted
+    assert any("stand_compliance" in support.instruments for support in found.supports)
+    assert updated(data, auto=True, believe=MACHINE).accepted
+
+
+def test_a_rise_that_no_figure_shows_is_none():
+    """Under one of two loads the error rises by a millionth at every pose, then by a thousandth."""
+    point, force = np.repeat(np.arange(20), 2).astype(str), np.tile([500.0, 1000.0], 20)
+    data = replace(PAPER.select(np.arange(40)), point=point, force=force, setup=np.full(40, ""))
+    given = HeldOut(np.full(40, 0.02), np.zeros((20, 2)), point)
+    for rise, clauses in ((1e-6, 0), (1e-3, 1)):
+        worse = replace(given, residual=given.residual + rise * (force > 600.0) * np.linspace(0.9, 1.1, 40))
+        assert len([*risen_conditions(data, given, worse)]) == clauses
 
 
 def test_auto_finds_the_hidden_sizes(two):

@@ -18,6 +18,7 @@ from toolpath_stiff.inference.doubts import gate_of
 from toolpath_stiff.inference.errors import LAW_REFITTED
 from toolpath_stiff.inference.judgement import ADEQUATE
 from toolpath_stiff.inference.left_out import HeldOut, gain_in_standard_errors
+from toolpath_stiff.inference.rivals import lowers_error
 from toolpath_stiff.portrait.portrait import LACKING
 from toolpath_stiff.readings.measurements import Readings
 from toolpath_stiff.readings.pulls import Pulls
@@ -38,7 +39,7 @@ def risen_conditions(data: Readings | Pulls, before: HeldOut, after: HeldOut) ->
         groups = np.unique(values)
         for value in groups.tolist() if len(groups) > 1 else ():
             old, new = (held.of_readings(values == value) for held in (before, after))
-            if gain_in_standard_errors(old, new) < -RISEN:
+            if gain_in_standard_errors(old, new) < -RISEN and lowers_error(new, old):
                 change = f"{100 * old.mean_error:.2f} to {100 * new.mean_error:.2f} %"
                 yield f"{words.format(value)} the error at left-out points rises, {change}"
 
