@@ -9,9 +9,9 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from tests.conftest import as_written
-from tests.updating.cases import campaign, dense, readings_by_hand
+from tests.updating.cases import active, campaign, dense, readings_by_hand
 from toolpath_stiff.correction.as_built import last_step
-from toolpath_stiff.correction.task import UpdateTask
+from toolpath_stiff.correction.task import MACHINE, UpdateTask
 from toolpath_stiff.correction.update import build_ladder
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.inference.covariances import Covariance, Groups
@@ -144,6 +144,38 @@ def test_the_form_is_least_known_away_from_the_measured_poses(fitted):
     assert errors.away >= errors.near > 0.0
 
 
+def test_a_law_that_play_may_stand_for_is_known_under_the_readings_load_only():
+    """Joints with play, read under 4 kN alone: a softer law fits, and under 1 kN the machine is softer by far."""
+    data = replace(campaign(100)[0], force=np.full(len(campaign(100)[0]), 4000.0))
+    play = active("joint_clearance", lost_motion=8e-6)
+
+    def softer(readings):
+        model = Predictor(NIST, readings)
+        return model.log_stiffness((0.0, 0.0), [play]) - model.log_stiffness()
+
+    data = replace(data, stiffness=data.stiffness * np.exp(softer(data)))
+    update = build_ladder(UpdateTask(NIST, data, strut_law=True, believe=MACHINE))
+    assert update.accepted and not update.added
+    errors, moved = update.errors, np.abs(softer(data)).mean()
+    assert errors.load == 4000.0 and errors.by_load == pytest.approx(moved, rel=0.3) and errors.of_load(4000.0) == 0.0
+    off = np.abs(softer(replace(data, force=np.full(len(data), 1000.0))) - softer(data)).mean()
+    assert off > 1.96 * np.hypot(errors.near, errors.struts)  # outside the band as it would be
+    assert off < 1.96 * errors.of_load(1000.0)
+    again = parse_machine(machine_toml(update.fitted(PROVENANCE))).uncertainty.errors
+    assert (again.load, again.by_load) == (4000.0, pytest.approx(errors.by_load))
+    several = replace(data, force=np.where(np.arange(len(data)) % 2, 4000.0, 500.0))
+    assert build_ladder(UpdateTask(NIST, several, strut_law=True, believe=MACHINE, force=True)).errors.by_load == 0.0
+
+
+def test_compliance_that_hangs_on_the_load_by_hand():
+    """A tenth of it at a quarter of the load: the same, 4^(1/3) or 4 times as much, each as likely."""
+    errors = ErrorModel(np.zeros((1, 43)), 0.0, 0.0, 0.0, 0.0, np.zeros((1, 6)), load=4000.0, by_load=0.1)
+    changes = 0.0, 4.0 ** (1.0 / 3.0) - 1.0, 3.0
+    assert errors.of_load(1000.0) == pytest.approx(0.1 * (sum(c**2 for c in changes) / 3.0) ** 0.5)
+    assert errors.of_load(4000.0) == 0.0
+    assert replace(errors, by_load=0.0).of_load(1.0) == 0.0
+
+
 def test_struts_and_joints_off_their_places_against_differences():
     # Each joint of the machine moved by half a millimetre in turn, the pose solved anew.
     data, _ = campaign(101)
@@ -201,6 +233,7 @@ def test_regions_are_quarters_of_the_points():
         ("struts_percent = ", "struts_percent = -", "struts_percent"),
         ("form_percent = [", "form_percent = [99.0, ", "form_percent"),
         ("places_mm_deg = [\n    [", "places_mm_deg = [\n    [0.0, 0.0],\n    [", "places_mm_deg"),
+        ("struts_percent = ", "load_N = 500.0\nstruts_percent = ", "load_N alone"),
         ("loadings = [\n", "loadings = [[1.0]]\nthrown_away = [\n", "uncertainty.errors"),
     ],
 )

@@ -50,6 +50,12 @@ def assumptions_of(analysis: EvaluatedPath, turned: str = "") -> list[str]:
             f"the band of the stiffness holds the uncertainty of the fitted parameters{beside}, propagated linearly: "
             f"{', '.join(analysis.parameter_band.names)}"
         )
+    errors = machine.uncertainty.errors if machine.uncertainty is not None else None
+    if errors is not None and (by_load := errors.of_load(analysis.force)):
+        sentences.append(
+            f"machine {machine.name} was read under {errors.load:g} N alone; what made it softer may hang on the load: "
+            f"{100 * by_load:.2g} % (sd) of the stiffness under {analysis.force:g} N, in the band; read it there, too"
+        )
     if not acting_effects(model) and isinstance(machine, Hexapod):
         sentences.append("platform, frame, joints, spindle, tool and table are rigid: the struts alone give way")
     return sentences

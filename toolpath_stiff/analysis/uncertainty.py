@@ -124,6 +124,8 @@ def parameter_band(
         paths = core.load_paths(model, samples.position[rows], turn, tools, force)
         by_geometry = np.concatenate([geometry_slopes(model, path, direction[rows][some]) for some, path in paths])
         factors[rows, -GEOMETRY:] -= stiffness[rows, None] * errors.of_geometry(by_geometry)
+    if by_load := errors.of_load(force):
+        factors = np.column_stack([factors, by_load * stiffness])
     near = errors.nearness(place)
     return ParameterBand(names, factors, stiffness * errors.form(near), near < FEW, place, direction)
 

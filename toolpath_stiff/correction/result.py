@@ -1,7 +1,7 @@
 """The result of an update: its steps, the data's support for them, in words, and the resulting machine."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from textwrap import fill
@@ -18,6 +18,7 @@ from toolpath_stiff.diagnosis.examination import percent_of, rounded_errors
 from toolpath_stiff.documents import Document, json_number, to_dict
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.files import Content, write_atomically
+from toolpath_stiff.inference.adequacy import hangs_on_load
 from toolpath_stiff.inference.doubts import question
 from toolpath_stiff.inference.drawn import Drawn
 from toolpath_stiff.inference.error_model import error_model
@@ -214,7 +215,10 @@ class Update(FolderResult):
             return None
         given, problem = self.last.fit if self.kept_law else None, self.task.problem
         geometry = problem.scatter.covariance.shared[:GEOMETRY]
-        return error_model(self.known, problem.predictor.data, self.noise, geometry, given)
+        errors = error_model(self.known, problem.predictor.data, self.noise, geometry, given)
+        by_load = 0.0 if errors is None or given else hangs_on_load(problem, self.model.fit)
+        load = float(self.task.data.of_tip.force[0])
+        return replace(errors, load=load, by_load=by_load) if errors and by_load else errors
 
     @cached_property
     def corrected(self) -> Hexapod | None:

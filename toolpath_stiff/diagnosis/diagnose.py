@@ -26,6 +26,7 @@ from toolpath_stiff.inference.judgement import FALSE_ALARM, NONE, Judgement, jud
 from toolpath_stiff.inference.left_out import held_out, of_readings
 from toolpath_stiff.inference.noise import noise_models
 from toolpath_stiff.inference.prediction import Predictor, scaled_law
+from toolpath_stiff.inference.rivals import INSTRUMENT
 from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.planning.plan import RivalPlan, reading_words
@@ -127,7 +128,17 @@ def diagnose(
         unexcluded=unexcluded(main),
         loops=beside_tip(main.problem.predictor.data, log_model, main.problem.scatter.covariance),
     )  # fmt: skip
-    return replace(diagnosis, portrait=portrait_of(diagnosis, progress), alike=alike_of(diagnosis))
+    return _unless_of_machine(replace(diagnosis, portrait=portrait_of(diagnosis, progress), alike=alike_of(diagnosis)))
+
+
+def _unless_of_machine(diagnosis: Diagnosis) -> Diagnosis:
+    """`ambiguous` instead of naming an instrument's error in whose place a part of the machine would look the same."""
+    named = diagnosis.fits[diagnosis.best].candidates if diagnosis.best in diagnosis.fits else ()
+    same = [diagnosis.alike[c.name].links for c in named if c.effect.is_instrument and c.name in diagnosis.alike]
+    if all(link == INSTRUMENT for links in same for link, _ in links):
+        return diagnosis
+    judgements = {name: replace(judgement, verdict="ambiguous") for name, judgement in diagnosis.judgements.items()}
+    return replace(diagnosis, verdict="ambiguous", judgements=judgements, main=judgements[diagnosis.main.noise.name])
 
 
 def _without_slips(

@@ -8,7 +8,7 @@ from toolpath_stiff import defaults
 from toolpath_stiff.defaults import NORMAL_95
 from toolpath_stiff.diagnosis.examination import NAMING, SHOWN, Diagnosis
 from toolpath_stiff.hints import Asked, command_line, hint, options
-from toolpath_stiff.inference.adequacy import LEFT
+from toolpath_stiff.inference.adequacy import LEFT, moved_by_law
 from toolpath_stiff.inference.candidates import choice_text
 from toolpath_stiff.inference.discrepancies import RANGE_LENGTH
 from toolpath_stiff.inference.drawn import seen_readings
@@ -31,6 +31,7 @@ from toolpath_stiff.inference.size_priors import EXPECTED
 from toolpath_stiff.inference.unexcluded import MATTERS, Unexcluded
 from toolpath_stiff.inference.votes import CHANCE, SMALL, outvoted, vote_words
 from toolpath_stiff.planning.plan import INDICATORS, reading_words, telling
+from toolpath_stiff.portrait.portrait import LACKING
 from toolpath_stiff.portrait.words import alike_text
 from toolpath_stiff.stiffness.sizes import joined
 from toolpath_stiff.units import mm_from_m
@@ -171,13 +172,27 @@ def _most_left(diagnosis: Diagnosis) -> str:
 
 def _hidden(diagnosis: Diagnosis) -> str:
     """Effects an adequate model may still hide: beside the readings, between them, in the law under a guessed noise."""
-    text = _most_left(diagnosis) + _unread(diagnosis)
+    text = _moved(diagnosis) + _most_left(diagnosis) + _unread(diagnosis)
     if not diagnosis.noise.guess:
         return text
     law = NORMAL_95 * np.sqrt(np.diag(diagnosis.base.covariance)[: len(diagnosis.machine.strut_law.parameters)].max())
     return (
         f"{text} But how far these readings scatter is only guessed: {100.0 * diagnosis.noise.typical:.2g} % a reading "
         f"would hide struts that are off by up to {100.0 * law:.2g} %, too."
+    )
+
+
+def _moved(diagnosis: Diagnosis) -> str:
+    """Sentence (with a leading space) on a file's law beside which more is left; "" where a refitted one is no better.
+
+    The readings decide for neither of the two, or the verdict were another.
+    """
+    given, refitted = _mean_errors(diagnosis)
+    if given <= LACKING * refitted or moved_by_law(diagnosis.main.problem, diagnosis.main.base) <= LEFT:
+        return ""
+    return (
+        f" But the strut law may be off: the machine as given leaves {given:.2g} %, with its law refitted "
+        f"{refitted:.2g} %, and so few readings do not tell that from chance."
     )
 
 
@@ -296,7 +311,7 @@ def next_steps(diagnosis: Diagnosis, request: Asked | None = None) -> list[str]:
 def _until_then(diagnosis: Diagnosis, request: Asked) -> list[str]:
     """Hint on lowering the error before the explanations are told apart, if an effect of the machine lowers it."""
     of_instrument = {f.name for f in diagnosis.main.families if f.effect.is_instrument} & {*diagnosis.plausible}
-    if {*diagnosis.plausible} <= of_instrument or np.mean(
+    if {*diagnosis.explanations[0].split(" + ")} <= of_instrument or np.mean(
         diagnosis.as_given.errors - diagnosis.likeliest.errors
     ) < LEFT:
         return []

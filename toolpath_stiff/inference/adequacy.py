@@ -65,3 +65,16 @@ def instead_of_law(problem: Problem, fit: Fit) -> tuple[dict[str, Fit], Votes]:
     rivals = {rival.name: rival for rival in rivals_of_law(problem, given, (*series, *ONE_BODY)).values()}
     ballots = votes(problem, fit, rivals)
     return {name: rivals[name] for name in ballots if not outvoted(ballots[name])}, ballots
+
+
+def hangs_on_load(problem: Problem, fit: Fit) -> float:
+    """Mean share of the tip's compliance that may hang on the load: what a law has moved that contacts may stand for.
+
+    Readings under several loads tell; under one load, contacts or play hold as well as another law.
+    """
+    tip = problem.predictor.data.tip
+    if not fit.law_free or np.ptp(problem.predictor.data.force[tip]) > 0.0:
+        return 0.0
+    parts = {name for instead in instead_of_law(problem, fit)[0].values() for name in instead.names}
+    moved = float(np.abs(fit.jacobian[tip, :2] @ fit.law).mean())
+    return moved if (parts - {*fit.names}) & {*SERIES[1:]} else 0.0

@@ -41,7 +41,7 @@ from toolpath_stiff.inference.fair_forms import fair_rivals
 from toolpath_stiff.inference.fits import refine
 from toolpath_stiff.inference.gates import Forms, Gate, absolute_gate, simulate
 from toolpath_stiff.inference.hypotheses import Family, discrepancy_evidence, probabilities, score_families, signatures
-from toolpath_stiff.inference.left_out import held_out
+from toolpath_stiff.inference.left_out import HeldOut, held_out
 from toolpath_stiff.inference.noise import Noise
 from toolpath_stiff.inference.nuisances import TAKEN_UP, not_told
 from toolpath_stiff.inference.prequential import carried, votes
@@ -396,7 +396,7 @@ def put_to_vote(
     guessed noises would hide is told instead.
     """
     verdict, explanations = decide(gates, probability)
-    base, ballots, lost = candidates.base, dict[str, FloatArray](), set[str]()
+    base, ballots, lost, left_out = candidates.base, dict[str, FloatArray](), set[str](), dict[str, HeldOut]()
     fits = {NONE: base} | {family.name: best for family, best in candidates.offered}
     fits |= {pair.name: pair for pair in gates.tried if pair.possible} | gates.fits
     if verdict == "adequate":
@@ -437,9 +437,13 @@ def put_to_vote(
     ballots = closest(ballots, of_law)
     # What noise would hide is told where the law had to move, but for what its votes rule out.
     hidden = [name for name in explanations if instead and verdict == "adequate" and name not in of_law]
+    final = "ambiguous" if instead or verdict == "adequate" else verdict
+    if final == "ambiguous" and verdict != "adequate":  # a name that is no longer alone: what else is as likely
+        hidden = [n for n in _smallest_set(probability, named=HELD) if n not in (*explanations, *lost, NONE)]
+        hidden = [n for n in hidden if lowers_error(left_out[NONE], held_out(fits[n], problem.point))]
     order = dict.fromkeys([*standing, *instead, *hidden])
     return (
-        "ambiguous" if instead or verdict == "adequate" else verdict,
+        final,
         shortened(problem, fits | instead, _closest_first([*order], verdict, ballots, lost, probability)),
         ballots,
     )

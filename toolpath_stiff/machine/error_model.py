@@ -50,6 +50,8 @@ class ErrorModel:
         (m, 6) `coordinates` of the measured poses.
     learned
         (r, 42) A: of the struts' and joints' errors u, in these deviations, readings leave u - A^T A u.
+    load, by_load
+        Load of all readings, N, and the share of the tip's compliance that may hang on it; 0: none, or it is known how.
     """
 
     loadings: FloatArray
@@ -59,6 +61,8 @@ class ErrorModel:
     away: float
     places: FloatArray
     learned: FloatArray = field(default_factory=lambda: np.zeros((1, GEOMETRY)))
+    load: float = np.inf
+    by_load: float = 0.0
 
     def of_geometry(self, slopes: FloatArray) -> FloatArray:
         """(n, 42) errors by struts and joints, of (n, 42) slopes to them: those by what readings leave unknown."""
@@ -79,6 +83,16 @@ class ErrorModel:
         """(n,) relative standard deviation of the form error, by `nearness` (n,)."""
         return np.asarray(np.sqrt(self.away**2 - (self.away**2 - self.near**2) * near))
 
+    def of_load(self, force: float) -> float:
+        """Relative standard deviation of the stiffness under another load (N) than the readings'.
+
+        The share may be as soft at any load, give way by Hertz's contacts as its cube root, or be play, the same at any
+        load: compliances as F^0, F^(-1/3) and F^(-1), each as likely as the others; assumed. Johnson 1985, Contact
+        Mechanics, 4.2.
+        """
+        changes = (self.load / force) ** np.array([0.0, 1.0 / 3.0, 1.0]) - 1.0 if self.by_load else np.zeros(1)
+        return self.by_load * float(np.sqrt(np.mean(changes**2)))
+
     def of(self, rows: IntArray | BoolArray | list[int]) -> ErrorModel:
         """Error model of some of the parameters."""
         return replace(self, loadings=self.loadings[rows])
@@ -90,4 +104,5 @@ class ErrorModel:
         )
         none = np.zeros((len(first), second.shape[1])), np.zeros((len(second), first.shape[1]))
         both = np.block([[first, none[0], geometry], [none[1], second, later_geometry]])
-        return replace(later, loadings=both)
+        hangs = max(self, later, key=lambda errors: errors.by_load)
+        return replace(later, loadings=both, load=hangs.load, by_load=hangs.by_load)

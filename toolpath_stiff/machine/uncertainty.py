@@ -24,6 +24,8 @@ STATED = {
     "learned": Key(shape=(1, GEOMETRY), many=True, low=-np.inf, high=np.inf),
     "form_percent": Key(unit="%", shape=(2,), low=0.0, high=np.inf),
     "places_mm_deg": Key(unit="mm, deg", shape=(1, 6), many=True),
+    "load_N": Key(unit="N", low=0.0, high=np.inf, open_low=True, required=False),
+    "by_load_percent": Key(unit="%", low=0.0, high=np.inf, required=False),
 }
 NOT_NEGATIVE = -1e-8  # smallest eigenvalue of a correlation matrix that rounding in a file may cause
 
@@ -64,7 +66,7 @@ def _read_errors(toml: MachineToml, table: object, parameters: int) -> ErrorMode
     if not isinstance(table, dict):
         raise toml.fault(section, "", f" = {table!r}", f"a section [{section}]")
     values = read_section(toml, section, table, STATED)
-    loadings, struts, joints, learned, (near, away), places = (values[key] for key in STATED)
+    loadings, struts, joints, learned, (near, away), places, load, by_load = (values.get(key) for key in STATED)
     if len(loadings) != parameters or loadings.shape[1] < GEOMETRY:
         raise toml.fault(section, "loadings", "", f"a row of {GEOMETRY} numbers or more for each parameter")
     if away < near:
@@ -72,7 +74,10 @@ def _read_errors(toml: MachineToml, table: object, parameters: int) -> ErrorMode
     position, angles = np.hsplit(places, 2)
     places = coordinates(m_from_mm(position), rad_from_deg(angles))
     form = (0.01 * float(near), 0.01 * float(away))
-    return ErrorModel(loadings, 0.01 * struts, m_from_mm(joints), *form, places, learned)
+    if (load is None) != (by_load is None):
+        raise toml.fault(section, "load_N" if by_load is None else "by_load_percent", " alone", "both, or neither")
+    of_load = (np.inf, 0.0) if load is None else (float(load), 0.01 * float(by_load))
+    return ErrorModel(loadings, 0.01 * struts, m_from_mm(joints), *form, places, learned, *of_load)
 
 
 def _is_correlation(matrix: FloatArray) -> bool:

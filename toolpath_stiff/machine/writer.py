@@ -40,7 +40,8 @@ HEADINGS = {
     "uncertainty": "What was fitted to measurements: standard deviations in the units of the keys, and correlations.",
     "uncertainty.errors": "How far the stiffness may be off at a pose, for bands. Rows of loadings: by how many of\n"
     "# its standard deviations each parameter is off by scatter, then by struts 1 to 6 and the joints' coordinates.\n"
-    "# learned: rows A, by which readings shrink the latter; form_percent: what the model lacks, here and elsewhere.",
+    "# learned: rows A, by which readings shrink the latter; form_percent: what the model lacks, here and elsewhere.\n"
+    "# load_N, by_load_percent: the readings' one load, and the share of the compliance that may hang on it.",
 }
 
 
@@ -131,6 +132,8 @@ def fitted_lines(machine: MachineTool) -> list[str]:
                 "form_percent": [100.0 * errors.near, 100.0 * errors.away],
                 "places_mm_deg": np.round(np.hstack([mm_from_m(position), deg_from_rad(angles)]), 6),
             }
+            if errors.by_load:
+                written |= {"load_N": errors.load, "by_load_percent": 100.0 * errors.by_load}
             lines += ["", f"# {HEADINGS['uncertainty.errors']}", "[uncertainty.errors]", *_rows(written)]
     return lines
 
