@@ -170,7 +170,7 @@ class ElementUpdate(Update):
         return question(self.task.problem)
 
     @property
-    def rises(self) -> list[str]:
+    def objections(self) -> list[str]:
         """No conditions: pulls are not grouped by any."""
         return []
 

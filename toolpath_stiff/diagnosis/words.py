@@ -131,8 +131,6 @@ def _rivals(diagnosis: Diagnosis) -> str:
     causes = [f"{_cause(diagnosis, entry[0])}{_alike(entry)}" for entry in diagnosis.entries]
     if len(diagnosis.explanations) < 2:
         return f"{_capital(causes[0])} is likeliest, but something else is not ruled out."
-    if len(causes) == 1 and diagnosis.best:
-        return f"{_capital(causes[0])}."
     if diagnosis.explanations[0] not in (NONE, diagnosis.best):
         return f"What is likeliest lowers no error at points that are left out: {'; '.join(causes)}."
     if diagnosis.explanations[0] == NONE and diagnosis.main.votes:
@@ -144,8 +142,10 @@ def _rivals(diagnosis: Diagnosis) -> str:
     if diagnosis.explanations[0] == NONE and diagnosis.main.base_gate.probability > FALSE_ALARM:
         looks = f"What the model leaves looks like scatter.{_most_left(diagnosis)} With what struts, joints and links"
         return f"{looks} leave that may be more than {100 * LEFT:g} %: either {', or '.join(causes)}."
+    if len(causes) == 1:
+        return f"{_capital(causes[0])}."
     first, second = (diagnosis.main.probability.get(name, 0.0) for name in diagnosis.explanations[:2])
-    if first < POSITIVE * second or len(causes) < 2:
+    if first < POSITIVE * second:
         return f"These explain the data about equally well: either {', or '.join(causes)}."
     return f"Most likely {causes[0]}; not ruled out: {'; '.join(causes[1:])}."
 
@@ -309,16 +309,21 @@ def next_steps(diagnosis: Diagnosis, request: Asked | None = None) -> list[str]:
 
 
 def _until_then(diagnosis: Diagnosis, request: Asked) -> list[str]:
-    """Hint on lowering the error before the explanations are told apart, if an effect of the machine lowers it."""
+    """Hint on lowering the error before the explanations are told apart, if an effect of the machine lowers it.
+
+    Where an instrument's error is one of them, by the first one without: `--auto` would write what is ruled out.
+    """
     of_instrument = {f.name for f in diagnosis.main.families if f.effect.is_instrument} & {*diagnosis.plausible}
-    if {*diagnosis.explanations[0].split(" + ")} <= of_instrument or np.mean(
-        diagnosis.as_given.errors - diagnosis.likeliest.errors
-    ) < LEFT:
+    of_machine = [name for name in diagnosis.explanations if of_instrument.isdisjoint(name.split(" + "))]
+    if not of_machine or np.mean(diagnosis.as_given.errors - diagnosis.likeliest.errors) < LEFT:
         return []
-    words = options(auto=True, believe="machine" if of_instrument else None)
-    trusted = f" if {joined(sorted(of_instrument))} {'is' if len(of_instrument) == 1 else 'are'} ruled out"
+    lower, words = "lower the error with what they share", options(auto=True)
+    if of_instrument:
+        named = next((name.split(" + ") for name in of_machine if name != NONE), [])
+        lower = f"if {joined(sorted(of_instrument))} {'is' if len(of_instrument) == 1 else 'are'} ruled out, lower it"
+        words = options(add=named, auto=not named, believe="machine")
     update = request.command("update", *words, "-o", request.updated_machine)
-    return [hint(f"until then, lower the error with what they share{trusted if of_instrument else ''}", update)]
+    return [hint(f"until then, {lower}", update)]
 
 
 def assumptions(diagnosis: Diagnosis) -> list[str]:
