@@ -84,11 +84,8 @@ def test_what_the_data_leave_open_is_planned(here, capsys):
     done = follow("tps diagnose 'a spindle.csv' --noise 2,1", capsys)
     plan, update, *further = done[1:]
     assert plan == "tps plan 'a spindle.csv' --noise 2,1"
-    # Until then: the likeliest part of the machine, since the first may be the indicator's stand; and what it leaves.
-    assert (
-        update
-        == "tps update 'a spindle.csv' --add spindle_compliance --believe machine -o nist-updated.toml --noise 2,1"
-    )
+    # Until then: what the update takes away, and what it leaves.
+    assert update == "tps update 'a spindle.csv' --auto --believe machine -o nist-updated.toml --noise 2,1"
     assert (here / "nist-updated.toml").is_file() and {shlex.split(line)[1] for line in further} == {
         "compare",
         "diagnose",

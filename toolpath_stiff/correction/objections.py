@@ -21,14 +21,13 @@ from toolpath_stiff.inference.left_out import HeldOut, gain_in_standard_errors
 from toolpath_stiff.inference.rivals import lowers_error
 from toolpath_stiff.portrait.portrait import LACKING
 from toolpath_stiff.readings.measurements import Readings
-from toolpath_stiff.readings.pulls import Pulls
 from toolpath_stiff.stiffness.sizes import joined
 from toolpath_stiff.units import mm_from_m
 
 RISEN = 2.0  # standard errors by which the error at left-out points must rise
 
 
-def risen_conditions(data: Readings | Pulls, before: HeldOut, after: HeldOut) -> Iterator[str]:
+def risen_conditions(data: Readings, before: HeldOut, after: HeldOut) -> Iterator[str]:
     """Clauses on loads, set-ups and tools under which left-out points are predicted worse, beyond chance."""
     conditions = {
         "under {:g} N": data.force,

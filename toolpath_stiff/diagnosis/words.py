@@ -311,19 +311,18 @@ def next_steps(diagnosis: Diagnosis, request: Asked | None = None) -> list[str]:
 def _until_then(diagnosis: Diagnosis, request: Asked) -> list[str]:
     """Hint on lowering the error before the explanations are told apart, if an effect of the machine lowers it.
 
-    Where an instrument's error is one of them, by the first one without: `--auto` would write what is ruled out.
+    Not where an instrument's error is far likelier than the machine: `--auto` would write it, whoever rules it out.
     """
     of_instrument = {f.name for f in diagnosis.main.families if f.effect.is_instrument} & {*diagnosis.plausible}
-    of_machine = [name for name in diagnosis.explanations if of_instrument.isdisjoint(name.split(" + "))]
-    if not of_machine or np.mean(diagnosis.as_given.errors - diagnosis.likeliest.errors) < LEFT:
+    likely = {name: diagnosis.main.probability.get(name, 0.0) for name in diagnosis.explanations}
+    of_machine = [chance for name, chance in likely.items() if of_instrument.isdisjoint(name.split(" + "))]
+    certain = POSITIVE * max(of_machine, default=0.0) < max(likely.values())
+    if certain or np.mean(diagnosis.as_given.errors - diagnosis.likeliest.errors) < LEFT:
         return []
-    lower, words = "lower the error with what they share", options(auto=True)
-    if of_instrument:
-        named = next((name.split(" + ") for name in of_machine if name != NONE), [])
-        lower = f"if {joined(sorted(of_instrument))} {'is' if len(of_instrument) == 1 else 'are'} ruled out, lower it"
-        words = options(add=named, auto=not named, believe="machine")
+    words = options(auto=True, believe="machine" if of_instrument else None)
+    trusted = f" if {joined(sorted(of_instrument))} {'is' if len(of_instrument) == 1 else 'are'} ruled out"
     update = request.command("update", *words, "-o", request.updated_machine)
-    return [hint(f"until then, {lower}", update)]
+    return [hint(f"until then, lower the error with what they share{trusted if of_instrument else ''}", update)]
 
 
 def assumptions(diagnosis: Diagnosis) -> list[str]:

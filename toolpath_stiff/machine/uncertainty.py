@@ -24,6 +24,8 @@ STATED = {
     "learned": Key(shape=(1, GEOMETRY), many=True, low=-np.inf, high=np.inf),
     "form_percent": Key(unit="%", shape=(2,), low=0.0, high=np.inf),
     "places_mm_deg": Key(unit="mm, deg", shape=(1, 6), many=True),
+}
+OF_LOAD = {
     "load_N": Key(unit="N", low=0.0, high=np.inf, open_low=True, required=False),
     "by_load_percent": Key(unit="%", low=0.0, high=np.inf, required=False),
 }
@@ -65,8 +67,12 @@ def _read_errors(toml: MachineToml, table: object, parameters: int) -> ErrorMode
         return None
     if not isinstance(table, dict):
         raise toml.fault(section, "", f" = {table!r}", f"a section [{section}]")
-    values = read_section(toml, section, table, STATED)
-    loadings, struts, joints, learned, (near, away), places, load, by_load = (values.get(key) for key in STATED)
+    values = read_section(toml, section, table, STATED | OF_LOAD)
+    loadings, struts, joints, learned, (near, away), places = (values[key] for key in STATED)
+    given = [key for key in OF_LOAD if key in values]
+    if len(given) == 1:
+        raise toml.fault(section, given[0], " alone", " and ".join(OF_LOAD))
+    load, by_load = (values[key] for key in OF_LOAD) if given else (np.inf, 0.0)
     if len(loadings) != parameters or loadings.shape[1] < GEOMETRY:
         raise toml.fault(section, "loadings", "", f"a row of {GEOMETRY} numbers or more for each parameter")
     if away < near:
@@ -74,10 +80,7 @@ def _read_errors(toml: MachineToml, table: object, parameters: int) -> ErrorMode
     position, angles = np.hsplit(places, 2)
     places = coordinates(m_from_mm(position), rad_from_deg(angles))
     form = (0.01 * float(near), 0.01 * float(away))
-    if (load is None) != (by_load is None):
-        raise toml.fault(section, "load_N" if by_load is None else "by_load_percent", " alone", "both, or neither")
-    of_load = (np.inf, 0.0) if load is None else (float(load), 0.01 * float(by_load))
-    return ErrorModel(loadings, 0.01 * struts, m_from_mm(joints), *form, places, learned, *of_load)
+    return ErrorModel(loadings, 0.01 * struts, m_from_mm(joints), *form, places, learned, load, 0.01 * by_load)
 
 
 def _is_correlation(matrix: FloatArray) -> bool:

@@ -99,7 +99,8 @@ class GapShares:
             information, pull = information + factor.T @ weighted[:, :-1], pull + factor.T @ weighted[:, -1]
             square += float(difference @ weighted[:, -1])
         explained = np.linalg.solve(information, pull)
-        return max(square - float(pull @ explained), 0.0), explained, np.linalg.inv(np.linalg.cholesky(information)).T
+        root = np.linalg.inv(np.linalg.cholesky(information)).T
+        return max(square - float(pull @ explained), 0.0), np.asarray(explained), root
 
     def _scatter(self, count: int) -> FloatArray:
         """(k, k) covariance of the difference of two outcomes of a visit of k readings."""

@@ -105,8 +105,8 @@ def go(
     if plain.approach is not None:
         _approach(state, block, end - begin if center is None else turn * 1j * (begin - center))
     check_known(state, block, there, rapid)
-    off = any(not abs(v) <= LARGEST_MM for v in there.values())  # nan in a check, behind an error
-    block.refuse_if(off, None, "leads to a point that is not known, or beyond 100 m")
+    nowhere = any(not abs(v) <= LARGEST_MM for v in there.values())  # nan in a check, behind an error
+    block.refuse_if(nowhere, None, "leads to a point that is not known, or beyond 100 m")
     if center is not None:
         off = abs(abs(begin - center) - abs(end - center))
         block.refuse_if(abs(begin - center) < ON_CIRCLE_MM, None, "begins at its circle centre", "another CC")
