@@ -145,7 +145,7 @@ def test_auto_judges_an_effect_beside_those_found_after_it():
 
     Beside the strut a stand predicts as well as the table, which was found before the strut and outvoted it then.
     """
-    data = read_measurements(Path(__file__).parent / "stand_and_weak_strut.csv", nist())
+    data = read_measurements(Path(__file__).parent / "foreign" / "stand_and_weak_strut.csv", nist())
     found = updated(data, auto=True)
     assert {*found.added} == {"table_compliance", "weak_strut"} and not found.accepted
     assert any("stand_compliance" in support.instruments for support in found.supports)
