@@ -232,3 +232,20 @@ def test_the_profile_holds_the_band(program):
         n_per_mm_from_n_per_m(found.parameter_band.deviation[drawn]), rel=1e-9
     )
     found.plot_profile()
+
+
+def test_under_another_load_what_may_hang_on_it_is_in_the_band_and_the_table(program):
+    """A tenth of the compliance at 4 kN: as much, 4^(1/3) or 4 times as much at 1 kN, each as likely."""
+    machine = with_errors([0.0, 0.0, 0.0], near=0.01, away=0.01)
+    errors = replace(machine.uncertainty.errors, load=4000.0, by_load=0.1)
+    machine = machine.with_changes(uncertainty=replace(machine.uncertainty, errors=errors))
+    by_load = 0.1 * (((4.0 ** (1.0 / 3.0) - 1.0) ** 2 + 9.0) / 3.0) ** 0.5
+    for force, expected in ((4000.0, 0.01), (1000.0, np.hypot(0.01, by_load))):
+        found = analyze(machine, program, step=0.05, force=force)
+        table = found.to_frame()[found.counted]
+        relative = table["stiffness_sd_N_per_mm"] / table["stiffness_N_per_mm"]
+        assert relative.to_numpy() == pytest.approx(np.full(len(table), expected), rel=1e-6)
+        assert any("may hang on the load" in sentence for sentence in found.to_dict()["assumptions"]) == (
+            force < 4000.0
+        )
+    assert "stiffness_sd_N_per_mm" not in analyze(NIST, program, step=0.05).to_frame()

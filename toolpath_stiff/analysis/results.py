@@ -139,7 +139,7 @@ class Analysis(EvaluatedPath, FolderResult):
 
     @property
     def deviation_N_per_mm(self) -> FloatArray | None:  # noqa: N802
-        """(n,) standard deviation of each sample's stiffness from the fitted parameters; None where none is stated."""
+        """(n,) standard deviation of each sample's stiffness, of all that a band holds; None where none is stated."""
         return None if self.parameter_band is None else n_per_mm_from_n_per_m(self.parameter_band.deviation)
 
     def to_frame(self) -> DataFrame:

@@ -258,9 +258,12 @@ def sample_columns(path: EvaluatedPath, rows: slice | IntArray = slice(None)) ->
     evaluation = path.at
     reach, names = evaluation.reach, np.array([limit.name for limit in evaluation.reach.limits] or ["none"])
     moving = (path.samples.motion[rows] != RAPID) & path.samples.tangent[rows].any(axis=1)
+    band = path.parameter_band
+    sd = {} if band is None else {"stiffness_sd_N_per_mm": n_per_mm_from_n_per_m(band.deviation[rows])}
     return {
         **path_columns(path.samples, rows),
         "stiffness_N_per_mm": n_per_mm_from_n_per_m(evaluation.stiffness[rows]),
+        **sd,
         "deflection_um": um_from_m(path.force / evaluation.stiffness[rows]),
         **joint_columns(path.machine, evaluation.joints[rows]),
         "margin": reach.margin[rows],

@@ -27,6 +27,7 @@ from toolpath_stiff.results import one_of
 COLUMNS: dict[str, int | None] = {
     **PATH_COLUMNS,
     "stiffness_N_per_mm": 4,
+    "stiffness_sd_N_per_mm": 4,
     "deflection_um": 6,
     "margin": 6,
     **dict.fromkeys(("margin_limit", "operation", "cut")),
