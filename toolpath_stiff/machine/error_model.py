@@ -86,9 +86,8 @@ class ErrorModel:
     def of_load(self, force: float) -> float:
         """Relative standard deviation of the stiffness under another load (N) than the readings'.
 
-        The share may be as soft at any load, give way by Hertz's contacts as its cube root, or be play, the same at any
-        load: compliances as F^0, F^(-1/3) and F^(-1), each as likely as the others; assumed. Johnson 1985, Contact
-        Mechanics, 4.2.
+        The share may be as soft at any load, contacts (Hertz: Johnson 1985, Contact Mechanics, 4.2) or play, that moves
+        as far at any load: compliances as F^0, F^(-1/3) and F^(-1), each as likely as the others; assumed.
         """
         changes = (self.load / force) ** np.array([0.0, 1.0 / 3.0, 1.0]) - 1.0 if self.by_load else np.zeros(1)
         return self.by_load * float(np.sqrt(np.mean(changes**2)))
