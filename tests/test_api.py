@@ -220,7 +220,7 @@ NO_EXAMPLE = {
         "kept_law",
         "known",
         *("model", "cause", "added"),
-        "rises",  # steps and fits in SI, and what follows from them
+        "objections",  # steps and fits in SI, and what follows from them
         *("described", "last", "changed", "worse", "supported", "verdict", "widening", "corrected", "fitted"),
         *("document", "noise", "question", "text", "assumptions", "errors"),
     },

@@ -23,7 +23,7 @@ SIZES = {
     "spindle_compliance": {"radial": 5.0, "axial": 2.0},
     "platform_flexibility": {"bar_stiffness": 3e8},
     "joint_compliance": {"compliance": 3.0},
-    "joint_moment_stiffness": {"stiffness": 4e5},
+    "joint_moment_stiffness": {"strut": 0, "stiffness": 4e5},
     "joint_clearance": {"lost_motion": 2.0},
     "contact_nonlinearity": {"compliance": 3.0},
     "strut_law": {"curvature": 10.0},

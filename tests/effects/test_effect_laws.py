@@ -161,6 +161,7 @@ def test_choices_are_never_fitted():
     assert chosen == {
         ("weak_strut", "strut"),
         ("frame_compliance", "vertex"),
+        ("joint_moment_stiffness", "strut"),
         ("setup_compliance", "setup"),
         ("gauge_scale", "direction"),
         ("gauge_scale", "setup"),

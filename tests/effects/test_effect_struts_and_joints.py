@@ -94,14 +94,15 @@ def test_compliance_linear_in_length_is_the_quoted_curvature():
     assert curved == pytest.approx(linear_compliance, rel=0.004)
 
 
-def swing_energy(machine, position, rotation, twist):
-    """Sum of squared angles by which the struts swing against frame and platform under a small twist: measured."""
+def swing_energy(machine, position, rotation, twist, strut):
+    """Sum of squared angles by which the struts, or one, swing against frame and platform under a small twist."""
     before = solve_struts(machine, position, rotation)
     turned = rotation_about(twist[3:]) @ rotation
     after = solve_struts(machine, position + twist[:3], turned)
     against_frame = angle(before.directions, after.directions)
     against_platform = angle(before.directions @ rotation, after.directions @ turned)
-    return float((against_frame**2 + against_platform**2).sum())
+    each = (against_frame**2 + against_platform**2).reshape(6)
+    return float(each[strut - 1] if strut else each.sum())
 
 
 def rotation_about(vector):
@@ -117,16 +118,19 @@ def angle(first, second):
     return np.arctan2(np.linalg.norm(np.cross(first, second), axis=-1), (first * second).sum(axis=-1))
 
 
-def test_joint_moment_stiffness_from_measured_swings():
+@pytest.mark.parametrize("strut", [0, 2, 6])
+def test_joint_moment_stiffness_from_measured_swings(strut):
     """The 6 x 6 of the effect against angles between strut axes before and after finite small motions."""
     machine = nist()
     positions, rotations = random_poses(4, 11)
-    model = model_with("joint_moment_stiffness", stiffness=1.0)
+    model = model_with("joint_moment_stiffness", stiffness=1.0, strut=strut)
     parallel = exact.assemble_links(model, load_path(model, positions, rotations))[1]
     step = 1e-5  # angles of 1e-5 are exact to 1e-11 in arctan2, and second-order terms are 1e-5 of the first
     for i in range(4):
         for twist in np.random.default_rng(i).normal(size=(8, 6)) * step:
-            both_ways = sum(swing_energy(machine, positions[i], rotations[i], sign * twist) for sign in (1, -1)) / 2
+            both_ways = (
+                sum(swing_energy(machine, positions[i], rotations[i], sign * twist, strut) for sign in (1, -1)) / 2
+            )
             assert twist @ parallel[i] @ twist == pytest.approx(both_ways, rel=1e-6)
 
 

@@ -31,7 +31,8 @@ POSITION, ROTATION = random_poses(40, seed=11)
 def model_of(kappa: float = 0.0, gap: float = 0.0, contact: float = 0.0, more: tuple = ()) -> StiffnessModel:
     given = (("joint_moment_stiffness", "stiffness", kappa), ("joint_clearance", "lost_motion", gap))
     given += (("contact_nonlinearity", "compliance", contact),)
-    extra = [ActiveEffect(find_effect(name), {key: value}) for name, key, value in given if value]
+    found = [(find_effect(name), key, value) for name, key, value in given if value]
+    extra = [ActiveEffect(effect, neutral_values(effect) | {key: value}) for effect, key, value in found]
     for name, values in more:
         effect = find_effect(name)
         extra.append(ActiveEffect(effect, neutral_values(effect) | values))
@@ -182,7 +183,7 @@ def test_forces_that_do_not_settle_are_an_error_that_names_effect_and_pose():
     model = build_model(
         nist(),
         extra=[
-            ActiveEffect(find_effect("joint_moment_stiffness"), {"stiffness": 5e5}),
+            ActiveEffect(find_effect("joint_moment_stiffness"), {"strut": 0, "stiffness": 5e5}),
             ActiveEffect(Slack(), {"size": 1e-6}),
         ],
     )

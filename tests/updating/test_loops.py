@@ -59,7 +59,7 @@ CASES = {
     "load and moments": (
         [
             ("contact_nonlinearity", {"compliance": 6e-9}),
-            ("joint_moment_stiffness", {"stiffness": 1e5}),
+            ("joint_moment_stiffness", {"strut": 0, "stiffness": 1e5}),
             ("setup_compliance", {"setup": "riser", "x": 2e-9, "y": 3e-9, "z": 4e-9}),
         ],
         {"hertz": 6e-9, "moment": 1e5, "setup": "riser", "setup_compliance": np.array([2e-9, 3e-9, 4e-9])},

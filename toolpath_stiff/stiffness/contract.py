@@ -396,7 +396,7 @@ class Effect:
         >>> import toolpath_stiff as tps
         >>> from toolpath_stiff.stiffness.model import load_path
         >>> path = load_path(tps.Machine.load("nist").model, (0, 0, 0.8))
-        >>> tps.effects()["joint_moment_stiffness"].parallel_stiffness(path, {"stiffness": 1000.0}).shape
+        >>> tps.effects()["joint_moment_stiffness"].parallel_stiffness(path, {"strut": 3, "stiffness": 1e3}).shape
         (1, 6, 6)
         """
         return None

@@ -10,11 +10,12 @@ SOURCE = (
     "5 N m/rad for a flexure joint (T. Dehaeze, test bench of flexible joints); 4 E I / L for locked "
     "joints: 0.84e5, 1.75e5, 5.5e5 for steel of 50, 60, 80 mm diameter, 3 m long"
 )
-MEANING = "rotational stiffness at each end of each strut"
+MEANING = "rotational stiffness at each end of the strut"
+WHICH = "which strut's joints; 0 is all struts'"
 
 
 class JointMomentStiffness(Effect):
-    """Rotational springs kappa at both ends of every strut, which stays straight.
+    """Rotational springs kappa at both ends of every strut, or of one, which stays straight.
 
     A twist (v, theta) of the platform about the tip moves the platform joint by v_i = v + theta x r_i. The strut's
     axis turns by phi_i = u_i x v_i / L_i, which is its rotation against the frame. Against the platform it turns by
@@ -30,18 +31,25 @@ class JointMomentStiffness(Effect):
     link = "joints"
     equation = "K += kappa sum_i (B_fi^T B_fi + B_pi^T B_pi), B: rotations of strut i against frame and platform"
     source = "derived here from rotational springs at the ends of straight struts"
-    parameters = (Parameter("stiffness", "N m/rad", 1.0, (0.0, 2e6), (5.0, 5.5e5), SOURCE, meaning=MEANING),)
+    parameters = (
+        Parameter("strut", "", 1.0, (0, 6), (0, 6), "number of the strut", 0.0, WHICH, "integer"),
+        Parameter("stiffness", "N m/rad", 1.0, (0.0, 2e6), (5.0, 5.5e5), SOURCE, meaning=MEANING),
+    )
 
     def parallel_stiffness(self, path: LoadPath, p: Values) -> FloatArray | None:
-        """Stiffness of all twelve rotational springs about the tip."""
+        """Stiffness of the rotational springs about the tip: of all twelve, or of one strut's two."""
         if p["stiffness"] == 0.0:
             return None
-        rotations = end_rotations(path).reshape(len(path), 36, 6)
+        struts = slice(None) if p["strut"] == 0 else slice(int(p["strut"]) - 1, int(p["strut"]))
+        rotations = end_rotations(path)[:, struts].reshape(len(path), -1, 6)
         return np.asarray(p["stiffness"] * np.swapaxes(rotations, 1, 2) @ rotations)
 
     def finding(self, p: Values) -> str:
         """Clause on the resistance of the joints to turning."""
-        return f"the joints resist turning by about {about(p['stiffness'] / 1e3)} kN m/rad at each end of each strut"
+        size = f"{about(p['stiffness'] / 1e3)} kN m/rad at each end"
+        if p["strut"]:
+            return f"the joints of strut {p['strut']} resist turning by about {size}"
+        return f"the joints resist turning by about {size} of each strut"
 
 
 def end_rotations(path: LoadPath) -> FloatArray:
