@@ -100,7 +100,7 @@ def test_joints_that_turn_less_easily_under_small_loads_are_recognised(folder):
     for force in np.unique(load).tolist():
         stiffness = 3e5 * 300.0 / (300.0 + force)
         (effect,) = (e for e in candidates.testable_effects(predictor)[0] if e.name == "joint_moment_stiffness")
-        found = np.exp(-predictor.log_stiffness(effects=[ActiveEffect(effect, {"stiffness": stiffness})]))
+        found = np.exp(-predictor.log_stiffness(effects=[ActiveEffect(effect, {"strut": 0, "stiffness": stiffness})]))
         whole = np.where(load == force, found, whole)
     found = portrait_with(predictor, whole - np.exp(-predictor.log_stiffness()))
     assert found.links[0][0] == "joints"
