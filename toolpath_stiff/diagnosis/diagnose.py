@@ -31,7 +31,7 @@ from toolpath_stiff.machine.model import Hexapod
 from toolpath_stiff.nc.moves import ReadProgram
 from toolpath_stiff.planning.plan import RivalPlan, reading_words
 from toolpath_stiff.planning.result import plan
-from toolpath_stiff.portrait.alike import Alike, looks_the_same
+from toolpath_stiff.portrait.alike import looks_the_same
 from toolpath_stiff.portrait.portrait import Portrait, draw_portrait
 from toolpath_stiff.poses import Pose
 from toolpath_stiff.readings.measurements import Readings
@@ -128,17 +128,7 @@ def diagnose(
         unexcluded=unexcluded(main),
         loops=beside_tip(main.problem.predictor.data, log_model, main.problem.scatter.covariance),
     )  # fmt: skip
-    return _unless_of_machine(replace(diagnosis, portrait=portrait_of(diagnosis, progress), alike=alike_of(diagnosis)))
-
-
-def _unless_of_machine(diagnosis: Diagnosis) -> Diagnosis:
-    """`ambiguous` instead of naming an instrument's error in whose place a part of the machine would look the same."""
-    named = diagnosis.fits[diagnosis.best].candidates if diagnosis.best in diagnosis.fits else ()
-    same = [diagnosis.alike[c.name].links for c in named if c.effect.is_instrument and c.name in diagnosis.alike]
-    if all(link == INSTRUMENT for links in same for link, _ in links):
-        return diagnosis
-    judgements = {name: replace(judgement, verdict="ambiguous") for name, judgement in diagnosis.judgements.items()}
-    return replace(diagnosis, verdict="ambiguous", judgements=judgements, main=judgements[diagnosis.main.noise.name])
+    return with_alike(replace(diagnosis, portrait=portrait_of(diagnosis, progress)))
 
 
 def _without_slips(
@@ -193,13 +183,20 @@ def portrait_of(diagnosis: Diagnosis, progress: Callable[[str], None]) -> Portra
     return portrait if portrait.terms or unexplained else None
 
 
-def alike_of(diagnosis: Diagnosis) -> dict[str, Alike]:
-    """Alternatives to each named effect: parts outside the catalogue that would look the same."""
-    main = diagnosis.main
-    named = diagnosis.fits.get(diagnosis.best or "")
+def with_alike(diagnosis: Diagnosis) -> Diagnosis:
+    """Diagnosis with alternatives to each named effect: parts outside the catalogue that would look the same.
+
+    `ambiguous` instead of a name where a part of the machine would look the same as an instrument's error.
+    """
+    main, named = diagnosis.main, diagnosis.fits.get(diagnosis.best or "")
     if diagnosis.verdict not in NAMING or named is None or main.noise.tip is not None:
-        return {}
-    return looks_the_same(main.problem, diagnosis.base, named, diagnosis.noise, diagnosis.seed)
+        return diagnosis
+    alike = looks_the_same(main.problem, diagnosis.base, named, diagnosis.noise, diagnosis.seed)
+    same = [alike[c.name].links for c in named.candidates if c.effect.is_instrument and c.name in alike]
+    if all(link == INSTRUMENT for links in same for link, _ in links):
+        return replace(diagnosis, alike=alike)
+    open_ones = {name: replace(judgement, verdict="ambiguous") for name, judgement in diagnosis.judgements.items()}
+    return replace(diagnosis, verdict="ambiguous", judgements=open_ones, main=open_ones[main.noise.name], alike=alike)
 
 
 def with_plan(diagnosis: Diagnosis, progress: Callable[[str], None] = lambda text: None) -> Diagnosis:

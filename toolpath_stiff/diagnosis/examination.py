@@ -138,7 +138,7 @@ class Diagnosis(FolderResult):
     portrait
         What the missing thing looks like (`portrait_of`); None where nothing is missing or left behind.
     alike
-        Named effect -> what else would look the same in its place (`alike_of`).
+        Named effect -> what else would look the same in its place (`with_alike`).
     unexcluded
         How far each further effect may go beside the likeliest explanation.
     suspects

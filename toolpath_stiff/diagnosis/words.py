@@ -172,27 +172,18 @@ def _most_left(diagnosis: Diagnosis) -> str:
 
 def _hidden(diagnosis: Diagnosis) -> str:
     """Effects an adequate model may still hide: beside the readings, between them, in the law under a guessed noise."""
-    text = _moved(diagnosis) + _most_left(diagnosis) + _unread(diagnosis)
+    text, (given, refitted) = _most_left(diagnosis) + _unread(diagnosis), _mean_errors(diagnosis)
+    if given > LACKING * refitted and moved_by_law(diagnosis.main.problem, diagnosis.main.base) > LEFT:
+        text += (
+            f" But the strut law may be off: the machine as given leaves {given:.2g} %, with its law refitted "
+            f"{refitted:.2g} %, and so few readings do not tell that from chance."
+        )
     if not diagnosis.noise.guess:
         return text
     law = NORMAL_95 * np.sqrt(np.diag(diagnosis.base.covariance)[: len(diagnosis.machine.strut_law.parameters)].max())
     return (
         f"{text} But how far these readings scatter is only guessed: {100.0 * diagnosis.noise.typical:.2g} % a reading "
         f"would hide struts that are off by up to {100.0 * law:.2g} %, too."
-    )
-
-
-def _moved(diagnosis: Diagnosis) -> str:
-    """Sentence (with a leading space) on a file's law beside which more is left; "" where a refitted one is no better.
-
-    The readings decide for neither of the two, or the verdict were another.
-    """
-    given, refitted = _mean_errors(diagnosis)
-    if given <= LACKING * refitted or moved_by_law(diagnosis.main.problem, diagnosis.main.base) <= LEFT:
-        return ""
-    return (
-        f" But the strut law may be off: the machine as given leaves {given:.2g} %, with its law refitted "
-        f"{refitted:.2g} %, and so few readings do not tell that from chance."
     )
 
 

@@ -82,7 +82,8 @@ class GapShares:
             alike = np.flatnonzero(counts == count)
             rows = self.visits.members[self.visits.starts[alike, None] + np.arange(count)]
             open_rows, left_rows = open_factor[rows], left[rows][..., None]
-            covariance = self._scatter(count) + open_rows @ np.swapaxes(open_rows, 1, 2)
+            scatter = 2.0 * (self.noise.repeat**2 * np.eye(count) + self.noise.clamping**2)
+            covariance = scatter + open_rows @ np.swapaxes(open_rows, 1, 2)
             squares[alike] = square + (left_rows * np.linalg.solve(covariance, left_rows))[..., 0].sum(axis=1)
         return squares
 
@@ -95,16 +96,14 @@ class GapShares:
         for visit in np.asarray(chosen, dtype=np.int64).tolist():
             rows = self.visits.members[self.visits.starts[visit] :][: self.visits.counts[visit]]
             factor, difference = self.factor[rows], self.difference[rows]
-            weighted = np.linalg.solve(self._scatter(len(rows)), np.column_stack([factor, difference]))
+            both, (r, c) = np.column_stack([factor, difference]), (self.noise.repeat, self.noise.clamping)
+            # Times the inverse of N = 2 (r^2 1 + c^2 11^T) by Sherman and Morrison.
+            weighted = (both - c**2 / (r**2 + len(rows) * c**2) * both.sum(axis=0)) / (2.0 * r**2)
             information, pull = information + factor.T @ weighted[:, :-1], pull + factor.T @ weighted[:, -1]
             square += float(difference @ weighted[:, -1])
         explained = np.linalg.solve(information, pull)
         root = np.linalg.inv(np.linalg.cholesky(information)).T
         return max(square - float(pull @ explained), 0.0), np.asarray(explained), root
-
-    def _scatter(self, count: int) -> FloatArray:
-        """(k, k) covariance of the difference of two outcomes of a visit of k readings."""
-        return np.asarray(2.0 * (self.noise.repeat**2 * np.eye(count) + self.noise.clamping**2))
 
 
 def pair_shares(visits: Visits, first: Forecast, second: Forecast, noise: ReadingNoise) -> GapShares:
