@@ -152,6 +152,14 @@ def test_auto_judges_an_effect_beside_those_found_after_it():
     assert updated(data, auto=True, believe=MACHINE).accepted
 
 
+def test_a_law_that_a_gauge_of_the_other_set_up_stands_for_stays_as_given():
+    """A gauge that reads 20 % too much on the table: on the riser too little, beside struts that are 18 % stiffer."""
+    data = campaign(100, "tilted", "none")[0]
+    found = updated(replace(data, stiffness=data.stiffness * np.where(data.setup == "table", 1.2, 1.0)), auto=True)
+    assert found.added == ("gauge_scale",) and not found.last.fit.law.any()
+    assert dict(found.last.fit.candidates[0].choice)["setup"] == "table"
+
+
 def test_a_rise_that_no_figure_shows_is_none():
     """Under one of two loads the error rises by a millionth at every pose, then by a thousandth."""
     point, force = np.repeat(np.arange(20), 2).astype(str), np.tile([500.0, 1000.0], 20)

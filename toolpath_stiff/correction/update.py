@@ -39,7 +39,7 @@ from toolpath_stiff.diagnosis.examination import percent_of
 from toolpath_stiff.documents import json_number
 from toolpath_stiff.errors import InputError
 from toolpath_stiff.hints import Asked, command_line, hint, options
-from toolpath_stiff.inference.candidates import Candidate, testable_effects
+from toolpath_stiff.inference.candidates import Candidate, candidates_of, testable_effects
 from toolpath_stiff.inference.drawn import Drawn, drawn, seen_readings
 from toolpath_stiff.inference.errors import AS_GIVEN, LAW_REFITTED
 from toolpath_stiff.inference.evidence import Fit, Problem
@@ -144,7 +144,9 @@ def build_ladder(task: UpdateTask) -> Update:
         supports = _supports(task, steps[-1].fit, [[candidate] for candidate in steps[-1].fit.candidates])
     names = steps[-1].fit.names
     if steps[-1].fit.law_free and (names or task.strut_law or task.auto):
-        given, law = _law_support(task, steps[-1])
+        chosen = steps[-1].fit.candidates
+        anew = [by_name.get(c.name) or candidates_of(c.effect, task.data) for c in chosen]
+        given, law = _law_support(task, steps[-1], anew)
         kept = not (law.supported or task.force) and names
         if kept and not all(support.supported for support in supports):
             beside_given = _supports(task, given.fit, [[candidate] for candidate in given.fit.candidates])
@@ -308,11 +310,15 @@ def support_of(
     )  # fmt: skip
 
 
-def _law_support(task: UpdateTask, after: LadderStep) -> tuple[LadderStep, Support]:
-    """Judge the refitted strut law of a step against the same effects with the file's law."""
+def _law_support(
+    task: UpdateTask, after: LadderStep, groups: Sequence[Sequence[Candidate]]
+) -> tuple[LadderStep, Support]:
+    """Judge the refitted strut law of a step against the same effects with the file's law, one chosen of each group.
+
+    Anew: a gauge that reads too much in one set-up is, beside another law, one that reads too little in the other.
+    """
     task.progress("judging the strut law")
     fit, problem = after.fit, task.problem
-    groups = [[candidate] for candidate in fit.candidates]  # chosen anew: beside a refitted law some may be absent
     given = LadderStep.of(LAW_GIVEN, fitted_with(task, base_fit(problem, law_free=False), groups), task.data)
     differences = votes(problem, fit, {LAW_GIVEN: given.fit})[LAW_GIVEN]
     reasons, instruments = [], dict[str, str]()
