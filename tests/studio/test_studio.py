@@ -936,8 +936,8 @@ def of_command(folder: Path, result: str) -> dict[str, Any]:
 
 def test_the_export_is_read_without_a_studio_and_has_the_figures_of_the_commands(resumed, browser, tmp_path):
     _, again = resumed
+    state = again.idle()  # an export holds what is worked out by then
     content = again.ask("GET", "/export")[1].decode()
-    state = again.idle()
     assert again.token not in content
     head, mark, tail = content.partition('id="data">')
     document, end, rest = tail.partition("</script>")
