@@ -436,14 +436,13 @@ def put_to_vote(
         return verdict, explanations, {}
     ballots = closest(ballots, of_law)
     # What noise would hide is told where the law had to move, but for what its votes rule out.
-    hidden = [name for name in explanations if instead and verdict == "adequate" and name not in of_law]
-    final = "ambiguous" if instead or verdict == "adequate" else verdict
-    if final == "ambiguous" and verdict != "adequate":  # a name that is no longer alone: what else is as likely
-        hidden = [n for n in _smallest_set(probability, named=HELD) if n not in (*explanations, *lost, NONE)]
-        hidden = [n for n in hidden if lowers_error(left_out[NONE], held_out(fits[n], problem.point))]
-    order = dict.fromkeys([*standing, *instead, *hidden])
+    further = [name for name in explanations if instead and verdict == "adequate" and name not in of_law]
+    if verdict == "ambiguous" or (instead and verdict == "identified"):  # no longer alone: what else is as likely
+        likely_too = [n for n in _smallest_set(probability, named=HELD) if n not in (*explanations, *lost, NONE)]
+        further = [n for n in likely_too if lowers_error(left_out[NONE], held_out(fits[n], problem.point))]
+    order = dict.fromkeys([*standing, *instead, *further])
     return (
-        final,
+        "ambiguous" if instead or verdict == "adequate" else verdict,
         shortened(problem, fits | instead, _closest_first([*order], verdict, ballots, lost, probability)),
         ballots,
     )
